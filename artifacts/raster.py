@@ -1,0 +1,115 @@
+"""Windows of mosaics on disk: tiled TIFF, 8-bit RGB or one channel, decoded tile by tile."""
+
+import os
+from contextlib import ExitStack, closing
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import tifffile
+
+from schemas.problem import BadInput
+from schemas.raster import Pixels
+
+REMEDY = "Stitch this surface again"
+
+
+class TiffWindows:
+    """Reads any window of a tiled (or striped) TIFF. Safe to use from several threads."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._name = name
+        try:
+            self._file = tifffile.TiffFile(path)
+            self._page: Any = self._file.pages[0]
+            self.height_px, self.width_px = (int(n) for n in self._page.shape[:2])
+            self._rows, self._columns = (int(n) for n in self._page.chunks[:2])
+        except (OSError, ValueError, IndexError, AttributeError, tifffile.TiffFileError) as error:
+            raise BadInput(name, f"its mosaic cannot be read ({error})", REMEDY) from None
+        self._across = -(-self.width_px // self._columns)
+        self._descriptor = self._file.filehandle.fileno()
+
+    def read(self, y0: int, y1: int, x0: int, x1: int) -> npt.NDArray[Any]:
+        """(y1 − y0, x1 − x0[, channels]) of rows y0..y1 and columns x0..x1."""
+        shape = (y1 - y0, x1 - x0, *self._page.shape[2:])
+        window = np.zeros(shape, dtype=self._page.dtype)
+        for i in range(y0 // self._rows, -(-y1 // self._rows)):
+            for j in range(x0 // self._columns, -(-x1 // self._columns)):
+                top, left = i * self._rows, j * self._columns
+                tile = self._tile(i * self._across + j)
+                if tile is None:
+                    continue  # a sparse tile: nothing was written there
+                a, b = max(y0, top), min(y1, top + tile.shape[0])
+                c, d = max(x0, left), min(x1, left + tile.shape[1])
+                window[a - y0 : b - y0, c - x0 : d - x0] = tile[a - top : b - top, c - left : d - left]
+        return window
+
+    def _tile(self, index: int) -> npt.NDArray[Any] | None:
+        offset, size = self._page.dataoffsets[index], self._page.databytecounts[index]
+        if size == 0:
+            return None
+        try:
+            data = os.pread(self._descriptor, size, offset)
+            decoded, _, _ = self._page.decode(data, index, jpegtables=self._page.jpegtables)
+        except Exception as error:  # whatever a codec raises over damaged bytes
+            raise BadInput(self._name, f"its mosaic is damaged ({error})", REMEDY) from None
+        tile = decoded[0]
+        return np.asarray(tile if len(self._page.shape) == 3 else tile[..., 0])
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class MosaicRaster:
+    """A mosaic's pixels, and where it knows them: covered by a photo and not taken out by a mask.
+
+    mask: a PNG, non-zero where pixels are to be taken out (Patterns.mask); None takes none out."""
+
+    def __init__(self, image: Path, coverage: Path, name: str, mask: Path | None = None) -> None:
+        with ExitStack() as opened:
+            self._image = opened.enter_context(closing(TiffWindows(image, name)))
+            self._coverage = opened.enter_context(closing(TiffWindows(coverage, name)))
+            self.height_px, self.width_px = self._image.height_px, self._image.width_px
+            self._mask = None if mask is None else read_mask(mask, name)
+            sizes = [(self._coverage.height_px, self._coverage.width_px)]
+            sizes += [] if self._mask is None else [self._mask.shape[:2]]
+            if any(size != (self.height_px, self.width_px) for size in sizes):
+                raise BadInput(name, "its mosaic and its masks differ in size", REMEDY)
+            self._opened = opened.pop_all()  # nothing went wrong: they stay open until close()
+
+    def rgb(self, y0: int, y1: int, x0: int, x1: int) -> Pixels:
+        return np.asarray(self._image.read(y0, y1, x0, x1))
+
+    def valid(self, y0: int, y1: int, x0: int, x1: int) -> npt.NDArray[np.bool_]:
+        known = self._coverage.read(y0, y1, x0, x1) > 0
+        if self._mask is not None:
+            known &= self._mask[y0:y1, x0:x1] == 0
+        return known
+
+    def close(self) -> None:
+        self._opened.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def read_mask(path: Path, name: str) -> Pixels:
+    """(H, W) uint8 of a one-channel PNG."""
+    mask = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if mask is None:
+        raise BadInput(name, "its mask cannot be read", REMEDY)
+    return np.asarray(mask, dtype=np.uint8)
+
+
+def write_mask(mask: npt.NDArray[np.bool_] | Pixels, path: Path) -> None:
+    """A PNG, 255 where `mask` is set, else 0."""
+    if not cv2.imwrite(str(path), np.where(mask, np.uint8(255), np.uint8(0))):
+        raise OSError(f"{path} could not be written")

@@ -1,0 +1,227 @@
+"""Surfaces become a flight plan, the plan a flight, the flight a log and photos (paper, section 2.3)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from prefect import flow
+
+from artifacts import store
+from flows.external_flight import photos_and_log
+from flows.inspection_file import existing
+from flows.model_structure import has_scans, model
+from flows.opening import opened
+from flows.workers import one_a_core
+from schemas.camera import Camera, CameraPose
+from schemas.file import File
+from schemas.flight_log import FlightLog
+from schemas.flight_plan import FlightPlan
+from schemas.geodesy import GeoOrigin
+from schemas.inspection import Inspection, PhotoSet, SimulationInput
+from schemas.problem import BadInput, LeftOut
+from schemas.structure import Structure
+from schemas.surface import Surface
+from tasks import run
+from tasks.flight.task import fly, import_log
+from tasks.photos.task import assign
+from tasks.planning.task import plan_flight
+from tasks.simulation.task import photograph, photograph_wall, start_vehicle
+
+# Where a plan is anchored when the inspection gives no origin: the home of ArduPilot's own simulator, so
+# that the mission can be rehearsed there but nobody takes it for a real place.
+REHEARSAL_ORIGIN = GeoOrigin(latitude_deg=-35.363262, longitude_deg=149.165237, altitude_m=584.0)
+PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".tif", ".tiff"}
+
+
+@dataclass(frozen=True)
+class PhotoSource:
+    """A photo file and what is known of it before it is opened."""
+
+    file: File
+    name: str
+    surface: str
+    stitch: bool = True
+    gsd_mm_px: float | None = None
+    camera: Camera | None = None
+    pose: CameraPose | None = None
+    position_sigma_m: float = 5.0
+
+
+@dataclass(frozen=True)
+class Collected:
+    plan: FlightPlan | None = None
+    log: FlightLog | None = None
+    photos: tuple[PhotoSource, ...] = ()
+    missing: tuple[LeftOut, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        return (*(self.plan.left_out if self.plan else ()), *self.missing)
+
+
+def plan(inspection: Inspection, structure: Structure) -> FlightPlan:
+    """Shooting points over the surfaces to inspect, and a collision-free path through them."""
+    if inspection.camera is None:
+        raise BadInput(
+            "camera", "a flight cannot be planned without one", "Give the key 'camera' its size and lens"
+        )
+    return plan_flight(
+        structure,
+        inspection.camera.camera(),
+        inspection.vehicle,
+        inspection.origin or REHEARSAL_ORIGIN,
+        inspection.home_m,
+        inspection.plan,
+    )
+
+
+def collect(
+    inspection: Inspection,
+    base: Path,
+    structure: Structure | None,
+    save_plan: Callable[[FlightPlan], None],
+) -> Collected:
+    """Plan and fly as the inspection says, then bring the photos together with where they were taken.
+
+    The plan is saved before the flight: whoever flies needs its mission files."""
+    if inspection.simulation is not None and inspection.simulation.scene == "wall":
+        return _simulated_wall(inspection.simulation)
+    surfaces = structure.surfaces if structure else ()
+    planned = plan(inspection, structure) if structure is not None and inspection.camera else None
+    if planned is not None:
+        save_plan(planned)
+    if inspection.flight is None or planned is None:
+        return Collected(planned, photos=tuple(_given_photos(inspection, base, None)), surfaces=surfaces)
+    if inspection.flight == "external":
+        photo_sets, log_path = photos_and_log(inspection, base)
+        inspection = inspection.model_copy(update={"photos": photo_sets})
+        log = import_log(store.current().put(log_path), log_path.name, planned)
+    else:
+        log = _flown(inspection, planned)
+    simulated = inspection.simulation is not None and inspection.flight == "simulated"
+    photos = (
+        _simulated_photos(inspection, planned, log) if simulated else _given_photos(inspection, base, log)
+    )
+    return Collected(planned, log, tuple(photos), _missed(log), surfaces)
+
+
+def _flown(inspection: Inspection, planned: FlightPlan) -> FlightLog:
+    if inspection.flight == "vehicle":
+        if inspection.connection is None:
+            raise BadInput("connection", "missing for 'flight: vehicle'", "Give it, as udpin:0.0.0.0:14550")
+        return fly(planned, inspection.mission, inspection.connection, 30.0)
+    if run.current().dry or fly.is_cached(planned, inspection.mission, "", 30.0):
+        return fly(planned, inspection.mission, "", 30.0)
+    seed = inspection.simulation.seed if inspection.simulation else 1
+    with start_vehicle(planned, seed) as connection:
+        return fly(planned, inspection.mission, connection, 30.0)
+
+
+def _missed(log: FlightLog) -> tuple[LeftOut, ...]:
+    return tuple(
+        LeftOut(item=photo, stage="flight", what="planned but not shot", remedy="Fly a new mission id")
+        for photo in log.missed
+    )
+
+
+def _simulated_photos(inspection: Inspection, planned: FlightPlan, log: FlightLog) -> list[PhotoSource]:
+    assert inspection.simulation is not None
+    poses = {shot.photo: shot.pose for shot in log.shots}
+    surfaces = sorted({point.surface for point in planned.shooting_points if point.surface})
+    folders = photograph.each([(inspection.simulation, planned, surface) for surface in surfaces])
+    return [
+        PhotoSource(
+            file=entry.file,
+            name=entry.name,
+            surface=surface,
+            camera=planned.camera,
+            pose=poses.get(Path(entry.name).stem),
+            position_sigma_m=_position_sigma_m(inspection),
+        )
+        for surface, folder in zip(surfaces, folders, strict=True)
+        if not isinstance(folder, BadInput)
+        for entry in folder.entries
+    ]
+
+
+def _simulated_wall(simulation: SimulationInput) -> Collected:
+    """The paper's wall needs no scan and no flight: it is photographed from known places."""
+    taken = photograph_wall(simulation)
+    poses = dict(taken.poses)
+    photos = tuple(
+        PhotoSource(
+            file=entry.file,
+            name=entry.name,
+            surface=taken.surface.name,
+            camera=taken.camera,
+            pose=poses[entry.name],
+            position_sigma_m=0.05,
+        )
+        for entry in taken.photos.entries
+    )
+    return Collected(photos=photos, surfaces=(taken.surface,))
+
+
+def _position_sigma_m(inspection: Inspection) -> float:
+    return float((inspection.vehicle.position_bias_m**2 + inspection.vehicle.position_jitter_m**2) ** 0.5)
+
+
+def _given_photos(inspection: Inspection, base: Path, log: FlightLog | None) -> list[PhotoSource]:
+    """The photos in the inspection's folders; those of a logged flight with their surface and pose."""
+    camera = inspection.camera.camera() if inspection.camera else None
+    sources = []
+    for photo_set in inspection.photos:
+        folder = existing(base, photo_set.folder, "photos")
+        paths = (
+            sorted(p for p in folder.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES)
+            if folder.is_dir()
+            else []
+        )
+        if not paths:
+            raise BadInput(
+                photo_set.folder, "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there"
+            )
+        shots = {}
+        if log is not None and photo_set.surface is None:
+            shots = {a.name: a.shot for a in assign(tuple(p.name for p in paths), log)}
+        for path in paths:
+            shot = shots.get(path.name)
+            sources.append(
+                PhotoSource(
+                    file=store.current().put(path),
+                    name=path.name,
+                    surface=(shot.surface if shot else None) or photo_set.surface or folder.resolve().name,
+                    stitch=photo_set.stitch,
+                    gsd_mm_px=_stated_gsd_mm_px(photo_set, camera),
+                    camera=camera,
+                    pose=shot.pose if shot else None,
+                    position_sigma_m=_position_sigma_m(inspection) if shot else 5.0,
+                )
+            )
+    return sources
+
+
+def _stated_gsd_mm_px(photo_set: PhotoSet, camera: Camera | None) -> float | None:
+    if photo_set.gsd_mm_px is not None or photo_set.stand_off_m is None:
+        return photo_set.gsd_mm_px
+    if camera is None:
+        raise BadInput(
+            photo_set.folder,
+            "stand_off_m needs a camera",
+            "Give the key 'camera' its size and lens, or gsd_mm_px",
+        )
+    return camera.gsd_mm_px(photo_set.stand_off_m)
+
+
+@flow(name="collect-images", description=__doc__, persist_result=False, task_runner=one_a_core())
+def collect_images(inspection: str = "demo:bridge", out: str | None = None) -> None:
+    """inspection: path of the YAML file (or demo:bridge); out: the run's folder."""
+    with opened(inspection, out) as open_run:
+        structure = None
+        if has_scans(open_run.inspection):
+            modelled = model(open_run.inspection, open_run.base)
+            open_run.save_model(modelled)
+            structure = modelled.structure
+        collected = collect(open_run.inspection, open_run.base, structure, open_run.save_plan)
+        open_run.save_collected(collected)

@@ -1,0 +1,104 @@
+"""Photos become mosaics, markers are taken out, cracks are found and measured (paper, section 3)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, TypeVar
+
+from prefect import flow
+
+from flows.collect_images import PhotoSource, collect
+from flows.model_structure import has_scans, model
+from flows.opening import opened
+from flows.workers import one_a_core
+from schemas.crack import Measurement
+from schemas.detection import Detection, Patterns
+from schemas.inspection import Inspection
+from schemas.mosaic import Mosaic
+from schemas.photo import Photo
+from schemas.problem import BadInput, LeftOut
+from schemas.surface import Surface
+from tasks.detection.task import detect
+from tasks.measurement.task import measure
+from tasks.patterns.task import remove_patterns
+from tasks.photos.task import features, ingest
+from tasks.stitching.task import single, stitch
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """One surface, or one photo that stands for itself, seen through to its cracks."""
+
+    mosaic: Mosaic
+    patterns: Patterns
+    detection: Detection
+    measurement: Measurement
+
+
+@dataclass(frozen=True)
+class Detected:
+    inspected: tuple[Inspected, ...]
+    problems: tuple[LeftOut, ...]
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        of_mosaics = (left for one in self.inspected for left in one.mosaic.left_out)
+        return (*self.problems, *of_mosaics)
+
+
+def detect_in_photos(
+    inspection: Inspection, sources: tuple[PhotoSource, ...], surfaces: tuple[Surface, ...]
+) -> Detected:
+    """Stitch each surface's photos, take the markers out, find the cracks and measure them."""
+    problems: list[LeftOut] = []
+
+    def usable(stage: str, members: list[T], outcomes: Sequence[object]) -> list[tuple[Any, ...]]:
+        """Each member with its outcome; what failed becomes a problem that the report lists."""
+        bad = [one for one in outcomes if isinstance(one, BadInput)]
+        problems.extend(LeftOut.because(stage, one) for one in bad)
+        good = [(m, o) for m, o in zip(members, outcomes, strict=True) if not isinstance(o, BadInput)]
+        if not good:
+            raise bad[0] if bad else BadInput("photos", "none given", "List their folders under 'photos'")
+        return good
+
+    taken = ingest.each((s.file, s.name, s.surface, s.camera, s.pose, s.position_sigma_m) for s in sources)
+    photos = usable("photos", list(sources), taken)
+    mosaics = _mosaics(inspection, photos, surfaces)
+    mosaics = [m for _, m in usable("stitching", [None] * len(mosaics), mosaics)]
+    cleaned = usable("patterns", mosaics, remove_patterns.each((m, inspection.patterns) for m in mosaics))
+    settings = inspection.detect
+    if inspection.report.baselines:
+        settings = settings.model_copy(update={"baselines": True})
+    found = usable("detection", cleaned, detect.each((m, p, settings) for m, p in cleaned))
+    measured = usable("measurement", found, measure.each((m, p, d, inspection.detect) for (m, p), d in found))
+    return Detected(tuple(Inspected(m, p, d, cracks) for ((m, p), d), cracks in measured), tuple(problems))
+
+
+def _mosaics(
+    inspection: Inspection, photos: list[tuple[PhotoSource, Photo]], surfaces: tuple[Surface, ...]
+) -> list[Mosaic | BadInput]:
+    """A mosaic for each surface, and one for each photo that stands for itself."""
+    known = {surface.name: surface for surface in surfaces}
+    alone = single.each((photo, source.gsd_mm_px) for source, photo in photos if not source.stitch)
+    to_stitch = sorted(((s, p) for s, p in photos if s.stitch), key=lambda pair: pair[0].surface)
+    described = features.each((photo, inspection.stitch) for _, photo in to_stitch)
+    calls = []
+    for name, group in groupby(zip(to_stitch, described, strict=True), key=lambda m: m[0][0].surface):
+        members = [(source, photo, f) for (source, photo), f in group if not isinstance(f, BadInput)]
+        gsd_mm_px = inspection.stitch.gsd_mm_px or members[0][0].gsd_mm_px
+        settings = inspection.stitch.model_copy(update={"gsd_mm_px": gsd_mm_px})
+        of_photos, of_features = tuple(p for _, p, _ in members), tuple(f for *_, f in members)
+        calls.append((name, known.get(name), of_photos, of_features, settings))
+    return [*alone, *stitch.each(calls)]
+
+
+@flow(name="detect-cracks", description=__doc__, persist_result=False, task_runner=one_a_core())
+def detect_cracks(inspection: str = "demo:wall", out: str | None = None) -> None:
+    """inspection: path of the YAML file (or demo:wall); out: the run's folder."""
+    with opened(inspection, out) as run:
+        modelled = model(run.inspection, run.base) if has_scans(run.inspection) else None
+        structure = modelled.structure if modelled else None
+        collected = collect(run.inspection, run.base, structure, run.save_plan)
+        run.save_detected(detect_in_photos(run.inspection, collected.photos, collected.surfaces))

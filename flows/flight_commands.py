@@ -1,0 +1,71 @@
+"""`hairline fly` and `convert-log`: a flight and its archive, on plain files."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from flows.command_line import app
+from flows.console import err
+from flows.plain_files import (
+    OutFolder,
+    read_contract,
+    say,
+    working,
+)
+from schemas.problem import BadInput
+
+if TYPE_CHECKING:
+    pass
+
+
+@app.command
+def fly(plan: Path, *, connection: str, out: OutFolder, mission: str = "1", timeout_s: float = 30.0) -> None:
+    """Upload a plan to a vehicle over MAVLink, fly it, archive it: D/flight.mcap, D/track.json.
+
+    Parameters
+    ----------
+    plan:
+        The plan.json of `hairline plan`.
+    connection:
+        MAVLink URL: udpin:0.0.0.0:14550, tcp:127.0.0.1:5760, /dev/ttyUSB0.
+    out:
+        Folder to write to.
+    mission:
+        Id of this flight.
+    timeout_s:
+        A vehicle silent for this long is lost, seconds.
+    """
+    from flows.results import write_flight
+    from schemas.flight_plan import FlightPlan
+    from tasks.flight.task import fly as fly_plan
+
+    planned = read_contract(plan, FlightPlan)
+    with working(out):
+        log = fly_plan.bare(planned, mission, connection, timeout_s)
+        write_flight(out, log, copy=True)
+    say(f"{len(log.shots)} photos in {log.duration_s / 60:.1f} min: {out / 'flight.mcap'}")
+    if log.missed:
+        err.print(
+            f"[yellow]Warning: {len(log.missed)} planned photos were not shot, first {log.missed[0]}[/yellow]"
+        )
+
+
+@app.command(name="convert-log")
+def convert_log(log: Path, *, out: Annotated[Path, Parameter(name="--out")]) -> None:
+    """Convert a flight log (tlog, BIN, ulg) to MCAP.
+
+    Parameters
+    ----------
+    log:
+        MAVLink telemetry (tlog), ArduPilot dataflash (BIN) or PX4 (ulg) log.
+    out:
+        The MCAP file to write.
+    """
+    from tasks.flight.task import convert
+
+    if not log.is_file():
+        raise BadInput(str(log), "no such file", "Correct the path")
+    with working(out.resolve().parent):
+        convert(log, out)
+    say(f"Wrote {out}")

@@ -1,0 +1,102 @@
+"""From raw scans and photos to a crack report: the whole of the paper, and the report it leaves to do."""
+
+from pathlib import Path
+
+from prefect import flow
+
+from flows.collect_images import Collected, collect
+from flows.detect_cracks import Detected, detect_in_photos
+from flows.model_structure import Modelled, has_scans, model
+from flows.opening import OpenRun, opened
+from flows.workers import one_a_core
+from schemas.crack_report import CrackReport
+from schemas.inspection import PhotoSet
+from schemas.problem import BadInput
+from schemas.surface import Surface
+from tasks.assessment.task import assess, write_report
+
+
+@flow(name="inspect-bridge", description=__doc__, persist_result=False, task_runner=one_a_core())
+def inspect_bridge(
+    inspection: str = "demo:bridge",
+    out: str | None = None,
+    redo: tuple[str, ...] = (),
+    photos: str | None = None,
+    log: str | None = None,
+) -> CrackReport | None:
+    """inspection: path of the YAML file (or demo:bridge, demo:wall); out: the run's folder; redo: stages to
+    run again; photos, log: of an external flight. Without photos it ends with the plan, and gives None."""
+    with opened(inspection, out, redo) as run:
+        if photos is not None or log is not None:
+            run = with_flight(run, photos, log)
+        return inspect(run)
+
+
+def inspect(run: OpenRun) -> CrackReport | None:
+    """The paper's two stages, data collection and crack detection, and the report."""
+    modelled = model(run.inspection, run.base) if has_scans(run.inspection) else None
+    if modelled is not None:
+        run.save_model(modelled)
+    structure = modelled.structure if modelled else None
+    collected = collect(run.inspection, run.base, structure, run.save_plan)
+    run.save_collected(collected)
+    if collected.photos:
+        detected = detect_in_photos(run.inspection, collected.photos, collected.surfaces)
+        run.save_detected(detected)
+        return report(run, modelled, collected, detected)
+    if modelled is None:
+        raise BadInput(
+            run.inspection.name, "names neither scans nor photos", "Give 'scans', 'photos' or 'simulation'"
+        )
+    return None
+
+
+def report(run: OpenRun, modelled: Modelled | None, collected: Collected, detected: Detected) -> CrackReport:
+    """Judge what was measured, list what was not inspected, and write it down for an engineer."""
+    mosaics = tuple(one.mosaic for one in detected.inspected)
+    measurements = tuple(one.measurement for one in detected.inspected)
+    patterns = tuple(one.patterns for one in detected.inspected)
+    left_out = (*(modelled.left_out if modelled else ()), *collected.left_out, *detected.left_out)
+    assessed = assess(
+        run.inspection.name,
+        run.inspection.detect.method,
+        mosaics,
+        measurements,
+        patterns,
+        _meant_to_be_inspected(collected),
+        left_out,
+        run.inspection.assess,
+    )
+    pages = write_report(
+        run.inspection,
+        assessed,
+        mosaics,
+        measurements,
+        patterns,
+        tuple(one.detection for one in detected.inspected),
+        modelled.structure if modelled else None,
+        modelled.model if modelled else None,
+        collected.plan,
+        collected.log,
+    )
+    run.save_report(assessed, pages)
+    return assessed
+
+
+def _meant_to_be_inspected(collected: Collected) -> tuple[Surface, ...]:
+    """Those of the plan; without a plan, those that photos were brought of."""
+    if collected.plan is not None:
+        names = {of_surface.surface for of_surface in collected.plan.coverage}
+    else:
+        names = {photo.surface for photo in collected.photos}
+    return tuple(surface for surface in collected.surfaces if surface.name in names)
+
+
+def with_flight(run: OpenRun, photos: str | None, log: str | None) -> OpenRun:
+    """The run of an external flight that is now flown: its photos and log, as paths from here."""
+    update: dict[str, object] = {}
+    if photos is not None:
+        update["photos"] = (PhotoSet(folder=str(Path(photos).resolve())),)
+    if log is not None:
+        update["flight_log"] = str(Path(log).resolve())
+    return OpenRun(run.inspection.model_copy(update=update), run.base, run.folder)

@@ -1,0 +1,56 @@
+"""Reading the inspection file, with messages that name the key and say what to do."""
+
+from pathlib import Path
+
+import yaml
+from pydantic import ValidationError
+
+from schemas.inspection import Inspection
+from schemas.problem import BadInput
+
+
+def read_inspection(path: Path) -> Inspection:
+    """The inspection that a YAML file describes. BadInput names the line or key that is wrong."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise BadInput(str(path), "no such file", "Write one with: hairline init FOLDER") from None
+    except IsADirectoryError:
+        raise BadInput(str(path), "is a folder", "Name the inspection's YAML file in it") from None
+    except (OSError, UnicodeDecodeError) as problem:
+        raise BadInput(str(path), f"cannot be read ({problem})", "Give a YAML text file") from None
+    except yaml.YAMLError as problem:
+        where = getattr(problem, "problem_mark", None)
+        line = f" at line {where.line + 1}" if where else ""
+        raise BadInput(
+            str(path), f"is not valid YAML{line}", "Correct the indentation or quotes there"
+        ) from None
+    if not isinstance(content, dict):
+        raise BadInput(str(path), "holds no settings", "Write one with: hairline init FOLDER")
+    try:
+        return Inspection.model_validate(content)
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
+
+
+def explain(item: str, problem: ValidationError) -> BadInput:
+    """A validation error in the words of the person who wrote the file."""
+    first = problem.errors()[0]
+    key = ".".join(str(part) for part in first["loc"]) or "the file"
+    if first["type"] == "extra_forbidden":
+        what, remedy = f"unknown key {key!r}", "Remove it or correct its spelling; README.md lists the keys"
+    elif first["type"] == "missing":
+        what, remedy = f"key {key!r} is missing", "Add it; README.md lists the keys"
+    else:
+        what = f"key {key!r} cannot be {first['input']!r} ({first['msg'].removeprefix('Value error, ')})"
+        remedy = "Correct it; README.md lists the keys"
+    others = problem.error_count() - 1
+    return BadInput(item, what + (f" (and {others} more)" if others else ""), remedy)
+
+
+def existing(base: Path, name: str, key: str) -> Path:
+    """A file or folder that the inspection names, relative to the inspection file's folder."""
+    path = base / name
+    if not path.exists():
+        raise BadInput(name, f"named by key {key!r}, does not exist in {base}", "Correct the path")
+    return path

@@ -1,0 +1,78 @@
+"""Scans become a registered model, the model becomes surfaces and obstacles (paper, sections 2.1, 2.2)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from prefect import flow
+
+from artifacts import store
+from flows.inspection_file import existing
+from flows.opening import opened
+from flows.workers import one_a_core
+from schemas.inspection import Inspection, ScanInput
+from schemas.problem import BadInput, LeftOut
+from schemas.registered_model import RegisteredModel
+from schemas.scan import Scan
+from schemas.structure import Structure
+from tasks.registration.task import ingest_scan, register
+from tasks.simulation.task import simulate_scans
+from tasks.surfaces.task import extract
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
+
+
+@dataclass(frozen=True)
+class Modelled:
+    model: RegisteredModel
+    structure: Structure
+    unreadable: tuple[LeftOut, ...] = ()
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        return (*self.unreadable, *self.structure.left_out)  # the structure passes on the model's
+
+
+def has_scans(inspection: Inspection) -> bool:
+    return bool(inspection.scans) or bool(inspection.simulation and inspection.simulation.scene == "bridge")
+
+
+def model(inspection: Inspection, base: Path) -> Modelled:
+    """Register the scans and find what is flat and what is in the way."""
+    scans, unreadable = usable_scans(inspection, base)
+    registered = register(scans, inspection.registration)
+    return Modelled(registered, extract(registered, inspection.surfaces), unreadable)
+
+
+def usable_scans(inspection: Inspection, base: Path) -> tuple[tuple[Scan, ...], tuple[LeftOut, ...]]:
+    """The scans that can be read, and those that cannot with their reasons."""
+    if inspection.simulation is not None and not inspection.scans:
+        return simulate_scans(inspection.simulation), ()
+    calls, problems = [], []
+    for given in inspection.scans:
+        try:
+            calls.append(_ingest_call(given, base))
+        except BadInput as problem:
+            problems.append(problem)
+    scans: list[Scan] = []
+    for outcome in ingest_scan.each(calls):
+        if isinstance(outcome, BadInput):
+            problems.append(outcome)
+        else:
+            scans.extend(outcome)
+    if not scans:
+        raise problems[0] if problems else BadInput("scans", "none given", "List them under the key 'scans'")
+    return tuple(scans), tuple(LeftOut.because("registration", problem) for problem in problems)
+
+
+def _ingest_call(given: ScanInput, base: Path) -> tuple[object, ...]:
+    path = existing(base, given.file, "scans")
+    if not path.is_file():
+        raise BadInput(given.file, "is not a file", "Name one scan file per entry of 'scans'")
+    return (store.current().put(path), path.name, METRES[given.unit], given.position_m, given.T_world_scan)
+
+
+@flow(name="model-structure", description=__doc__, persist_result=False, task_runner=one_a_core())
+def model_structure(inspection: str = "demo:bridge", out: str | None = None) -> None:
+    """inspection: path of the YAML file (or demo:bridge); out: the run's folder."""
+    with opened(inspection, out) as run:
+        run.save_model(model(run.inspection, run.base))

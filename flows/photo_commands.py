@@ -1,0 +1,193 @@
+"""`hairline stitch`, `detect` and `measure`: from photos to cracks, on plain files."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from flows.command_line import app
+from flows.plain_files import (
+    OutFolder,
+    one_by_one,
+    photos_in,
+    read_camera,
+    say,
+    warn,
+    working,
+)
+from schemas.problem import BadInput, LeftOut
+
+if TYPE_CHECKING:
+    from schemas.crack import Measurement
+    from schemas.detection import Detection, Patterns
+    from schemas.mosaic import Mosaic
+    from schemas.settings import DetectSettings
+
+Method = Literal["hairline", "paper", "global"]
+
+
+@app.command
+def stitch(
+    folder: Path, *, out: OutFolder, gsd_mm_px: float | None = None, camera: Path | None = None
+) -> None:
+    """Stitch the photos of one surface: D/mosaic.tif, D/stitch.json (per photo: status, 3×3 homography).
+
+    Parameters
+    ----------
+    folder:
+        Photos: JPEG, PNG, TIFF. Focal length, GPS and gimbal angles are read from EXIF where present.
+    out:
+        Folder to write to.
+    gsd_mm_px:
+        States the mosaic's scale, mm per pixel. Default: from GPS and altitude where the photos have them.
+    camera:
+        YAML with width_px, height_px and focal_px, where EXIF lacks or errs.
+    """
+    from artifacts import store
+    from flows.results import write_mosaic
+    from schemas.photo import Photo
+    from schemas.settings import StitchSettings
+    from tasks.photos.task import features, ingest
+    from tasks.stitching.task import stitch as stitch_photos
+
+    lens = read_camera(camera) if camera else None
+    name = folder.resolve().name
+
+    def ingested(path: Path) -> Photo:
+        return ingest.bare(store.current().put(path), path.name, name, lens, None, 5.0)
+
+    with working(out):
+        photos, left_out = one_by_one(photos_in(folder), ingested)
+        settings = StitchSettings(gsd_mm_px=gsd_mm_px)
+        described = tuple(features.bare(photo, settings) for photo in photos)
+        mosaic = stitch_photos.bare(name, None, tuple(photos), described, settings)
+        write_mosaic(out, mosaic, copy=True)
+    counts = {s: sum(p.status == s for p in mosaic.placements) for s in ("solved", "placed", "rejected")}
+    say(", ".join(f"{count} {status}" for status, count in counts.items()) + f": {out / 'mosaic.tif'}")
+    warn([*left_out, *mosaic.left_out])
+
+
+@app.command
+def detect(
+    images: Path,
+    *,
+    out: OutFolder,
+    method: Method = "hairline",
+    gsd_mm_px: float | None = None,
+    global_threshold: int | None = None,
+) -> None:
+    """Find and measure cracks in images as they are: D/NAME.mask.png (0/255) per image, D/cracks.json.
+
+    Parameters
+    ----------
+    images:
+        An image or a folder of images: JPEG, PNG, TIFF.
+    out:
+        Folder to write to.
+    method:
+        hairline: Sauvola's local thresholds from valid pixels only. paper: the paper's method, step by step.
+        global: one threshold for the whole image.
+    gsd_mm_px:
+        Ground sample distance, mm per pixel; without it results are in pixels only.
+    global_threshold:
+        Grey level of `global`, 1 to 254. Default: from the histogram's peaks.
+    """
+    from artifacts.run_folder import lay_out
+    from flows.results import write_json
+    from schemas.settings import AssessSettings, DetectSettings
+    from tasks.assessment.task import assess
+
+    settings = DetectSettings(method=method, global_threshold=global_threshold)
+    seen: list[Detected] = []
+    problems: list[BadInput] = []
+    paths = photos_in(images)
+    with working(out) as progress:
+        for number, path in enumerate(paths, start=1):
+            try:
+                seen.append(detected(path, settings, gsd_mm_px))
+                name = path.stem if [p.stem for p in paths].count(path.stem) == 1 else path.name
+                lay_out(out, {f"{name}.mask.png": seen[-1].detection.mask}, copy=True)
+            except BadInput as problem:
+                problems.append(problem)
+            progress(number / len(paths))
+        if not seen:
+            raise problems[0]
+        left_out = tuple(LeftOut.because("detection", problem) for problem in problems)
+        report = assess.bare(
+            images.resolve().name,
+            method,
+            tuple(one.mosaic for one in seen),
+            tuple(one.measurement for one in seen),
+            tuple(one.patterns for one in seen),
+            (),
+            left_out,
+            AssessSettings(),
+        )
+        write_json(out / "cracks.json", report)
+    say(f"{len(report.cracks)} cracks in {len(seen)} images: {out / 'cracks.json'}")
+    warn(left_out)
+
+
+@dataclass(frozen=True)
+class Detected:
+    mosaic: "Mosaic"
+    patterns: "Patterns"
+    detection: "Detection"
+    measurement: "Measurement"
+
+
+def detected(path: Path, settings: "DetectSettings", gsd_mm_px: float | None) -> Detected:
+    """One image, seen through to its cracks."""
+    from artifacts import store
+    from schemas.settings import PatternSettings
+    from tasks.detection.task import detect as detect_cracks
+    from tasks.measurement.task import measure as measure_cracks
+    from tasks.patterns.task import remove_patterns
+    from tasks.photos.task import ingest
+    from tasks.stitching.task import single
+
+    photo = ingest.bare(store.current().put(path), path.name, path.stem, None, None, 5.0)
+    mosaic = single.bare(photo, gsd_mm_px)
+    patterns = remove_patterns.bare(mosaic, PatternSettings())
+    detection = detect_cracks.bare(mosaic, patterns, settings)
+    return Detected(mosaic, patterns, detection, measure_cracks.bare(mosaic, patterns, detection, settings))
+
+
+@app.command
+def measure(image: Path, mask: Path, *, out: OutFolder, gsd_mm_px: float | None = None) -> None:
+    """Measure the cracks that a mask marks in an image: D/cracks.json.
+
+    Parameters
+    ----------
+    image:
+        JPEG, PNG or TIFF.
+    mask:
+        Image of the same size, not 0 where there is a crack.
+    out:
+        Folder to write to.
+    gsd_mm_px:
+        Ground sample distance, mm per pixel; without it results are in pixels only.
+    """
+    from artifacts import store
+    from flows.results import write_json
+    from schemas.settings import AssessSettings, DetectSettings, PatternSettings
+    from tasks.assessment.task import assess
+    from tasks.detection.task import given_mask
+    from tasks.measurement.task import measure as measure_cracks
+    from tasks.patterns.task import remove_patterns
+    from tasks.photos.task import ingest
+    from tasks.stitching.task import single
+
+    with working(out):
+        for path in (image, mask):
+            if not path.is_file():
+                raise BadInput(str(path), "no such file", "Correct the path")
+        photo = ingest.bare(store.current().put(image), image.name, image.stem, None, None, 5.0)
+        mosaic = single.bare(photo, gsd_mm_px)
+        patterns = remove_patterns.bare(mosaic, PatternSettings(remove=False))
+        detection = given_mask(mosaic, store.current().put(mask), mask.name)
+        measured = measure_cracks.bare(mosaic, patterns, detection, DetectSettings())
+        report = assess.bare(
+            image.name, "given mask", (mosaic,), (measured,), (patterns,), (), (), AssessSettings()
+        )
+        write_json(out / "cracks.json", report)
+    say(f"{len(report.cracks)} cracks: {out / 'cracks.json'}")

@@ -1,0 +1,111 @@
+"""What the commands of single stages share: reading plain files, a temporary store, warnings."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import yaml
+from cyclopts import Parameter
+from pydantic import BaseModel, ValidationError
+
+from flows.console import StageLines, err
+from flows.console import out as console
+from flows.inspection_file import explain
+from schemas.camera import Camera
+from schemas.inspection import CameraInput
+from schemas.problem import BadInput, LeftOut
+
+Model = TypeVar("Model", bound=BaseModel)
+Many = Parameter(consume_multiple=True)
+OutFolder = Annotated[Path, Parameter(name="--out")]
+
+
+@contextmanager
+def working(folder: Path) -> Iterator[Callable[[float], None]]:
+    """A temporary store and progress for a stage; the output's folder exists."""
+    from artifacts import store
+    from tasks import run
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise BadInput(str(folder), f"cannot be made ({problem.strerror})", "Give another --out") from None
+    with store.temporary(), StageLines() as lines, run.running(run.Run(listener=lines)):
+        yield lambda fraction: lines(run.Event("", "progress", fraction=fraction))
+
+
+def warn(left_out: list[LeftOut] | tuple[LeftOut, ...]) -> None:
+    """One line for each reason, with the items that it concerns."""
+    items: dict[tuple[str, str], list[str]] = {}
+    for left in left_out:
+        items.setdefault((left.what, left.remedy), []).append(left.item)
+    for (what, remedy), names in items.items():
+        text = f"Warning: left out: {', '.join(names)}: {what}. {remedy}".rstrip().replace("[", r"\[")
+        err.print(f"[yellow]{text}[/yellow]")
+
+
+def read_contract(path: Path, contract: type[Model]) -> Model:
+    """A schema from the JSON that another command wrote."""
+    try:
+        return contract.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        raise BadInput(str(path), "no such file", "Give the JSON that an earlier command wrote") from None
+    except (OSError, UnicodeDecodeError) as problem:
+        raise BadInput(str(path), f"cannot be read ({problem})", "Give a JSON file") from None
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
+
+
+def read_camera(path: Path) -> Camera:
+    """CAMERA.yaml: width_px, height_px, and focal_px or focal_mm with sensor_width_mm; k1…, shutter_s."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError:
+        raise BadInput(
+            str(path), "cannot be read", "Give a YAML file with width_px, height_px, focal_px"
+        ) from None
+    except (yaml.YAMLError, UnicodeDecodeError):
+        raise BadInput(
+            str(path), "is not valid YAML", "Write width_px, height_px and focal_px in it"
+        ) from None
+    try:
+        return CameraInput.model_validate(
+            content.get("camera", content) if isinstance(content, dict) else content
+        ).camera()
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
+
+
+def one_by_one(
+    paths: list[Path], call: Callable[[Path], Model | tuple[Model, ...]]
+) -> tuple[list[Model], list[LeftOut]]:
+    """The results of the usable files; the others by name. BadInput where none is usable."""
+    good: list[Model] = []
+    problems: list[BadInput] = []
+    for path in paths:
+        try:
+            result = call(path)
+            good.extend(result if isinstance(result, tuple) else (result,))
+        except BadInput as problem:
+            problems.append(problem)
+    if not good:
+        raise problems[0]
+    return good, [LeftOut.because("reading", problem) for problem in problems]
+
+
+def photos_in(path: Path) -> list[Path]:
+    from flows.collect_images import PHOTO_SUFFIXES
+
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise BadInput(str(path), "no such file or folder", "Correct the path")
+    paths = sorted(p for p in path.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES)
+    if not paths:
+        raise BadInput(str(path), "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
+    return paths
+
+
+def say(text: str) -> None:
+    console.print(text.replace("[", r"\["))

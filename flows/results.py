@@ -1,0 +1,106 @@
+"""The files with fixed names that people and other programs find: runs/<inspection>/<stage>/…, or --out.
+
+Pictures and clouds are links into the store unless `copy` is asked for; JSON and the report are real files.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from artifacts.mission_files import write_plan, write_waypoints
+from artifacts.run_folder import lay_out
+from schemas.detection import Detection, Patterns
+from schemas.file import Folder
+from schemas.flight_log import FlightLog
+from schemas.flight_plan import FlightPlan
+from schemas.mosaic import Mosaic
+from schemas.registered_model import RegisteredModel
+from schemas.structure import Structure
+
+
+def write_json(path: Path, content: BaseModel | Mapping[str, Any]) -> None:
+    """Stable bytes: the same content gives the same file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plain = content.model_dump(mode="json") if isinstance(content, BaseModel) else content
+    temporary = path.with_name(f".{path.name}.tmp")
+    temporary.write_text(json.dumps(plain, indent=1) + "\n", encoding="utf-8")
+    temporary.replace(path)
+
+
+def write_registration(folder: Path, model: RegisteredModel, copy: bool = False) -> None:
+    """poses.json: `T_world_scan` 4×4 per scan, metres; model.ply."""
+    poses = {
+        station.name: _shifted(station.T_world_scan, model.origin_m).tolist() for station in model.stations
+    }
+    write_json(
+        folder / "poses.json",
+        {"unit": "m", "T_world_scan": poses} | model.model_dump(mode="json", exclude={"cloud"}),
+    )
+    lay_out(folder, {"model.ply": model.cloud}, copy=copy)
+
+
+def _shifted(T_world_scan: Any, origin_m: tuple[float, float, float]) -> Any:
+    T = np.array(T_world_scan)
+    T[:3, 3] += origin_m
+    return T
+
+
+def write_structure(folder: Path, structure: Structure, copy: bool = False) -> None:
+    write_json(folder / "surfaces.json", structure)
+    lay_out(folder, {"occupied.ply": structure.occupied}, copy=copy)
+
+
+def write_flight_plan(folder: Path, plan: FlightPlan) -> None:
+    write_json(folder / "plan.json", plan)
+    write_waypoints(plan, folder / "mission.waypoints")
+    write_plan(plan, folder / "mission.plan")
+
+
+def write_flight(folder: Path, log: FlightLog, copy: bool = False) -> None:
+    write_json(folder / "track.json", log.model_dump(mode="json", exclude={"archive"}))
+    lay_out(folder, {f"flight{log.archive.suffix}": log.archive}, copy=copy)
+
+
+def write_mosaic(folder: Path, mosaic: Mosaic, copy: bool = False) -> None:
+    """stitch.json: per photo its status, its 3×3 homography from undistorted photo pixels to mosaic pixels,
+    and the adjusted camera that undistorts it."""
+    plain = mosaic.model_dump(mode="json", exclude={"image", "coverage", "source", "photos"})
+    for placement, photo in zip(plain["placements"], mosaic.photos, strict=True):
+        placement["camera"] = photo.camera.model_dump(mode="json")
+    write_json(folder / "stitch.json", plain)
+    lay_out(
+        folder,
+        {
+            "mosaic.tif": mosaic.image,
+            "mosaic.coverage.tif": mosaic.coverage,
+            "mosaic.source.tif": mosaic.source,
+        },
+        copy=copy,
+    )
+
+
+def lay_out_model(folder: Path, model: RegisteredModel, structure: Structure) -> None:
+    write_registration(folder / "registration", model)
+    write_structure(folder / "surfaces", structure)
+
+
+def lay_out_flight(folder: Path, log: FlightLog | None) -> None:
+    if log is not None:
+        write_flight(folder / "flight", log)
+
+
+def lay_out_mosaic(folder: Path, mosaic: Mosaic, patterns: Patterns, detection: Detection) -> None:
+    write_mosaic(folder / "mosaics" / mosaic.name, mosaic)
+    lay_out(
+        folder / "detection" / mosaic.name,
+        {"cracks.png": detection.mask, "not_inspected.png": patterns.mask},
+        copy=False,
+    )
+
+
+def lay_out_report(folder: Path, pages: Folder) -> None:
+    lay_out(folder, {"report": pages}, copy=True)

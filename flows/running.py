@@ -1,0 +1,147 @@
+"""Running flows from the command line, with a Prefect server where one answers, else without."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+
+from flows.console import StageLines, out
+from schemas.crack_report import CrackReport
+
+SERVER = "http://127.0.0.1:4200/api"
+
+
+def use_server_that_answers() -> None:
+    """Set PREFECT_API_URL to a server that answers; else unset it, which makes Prefect start its own."""
+    configured = os.environ.get("PREFECT_API_URL")
+    for url in filter(None, (configured, SERVER)):
+        with contextlib.suppress(httpx.HTTPError):
+            if httpx.get(f"{url}/health", timeout=2.0).status_code == 200:
+                os.environ["PREFECT_API_URL"] = url
+                return
+    if configured:
+        out.print(f"No Prefect server answers at {configured}; going on without a dashboard.")
+    os.environ.pop("PREFECT_API_URL", None)
+
+
+@contextlib.contextmanager
+def listening(dry: bool = False) -> Iterator[None]:
+    from tasks import run
+
+    with StageLines() as lines, run.running(run.Run(listener=lines, dry=dry, lay_out=not dry)):
+        yield
+
+
+class NotAllCached(Exception):
+    """Some stage has to run."""
+
+
+def run_flow(
+    inspection: str,
+    out: str | None,
+    redo: tuple[str, ...] = (),
+    photos: str | None = None,
+    log: str | None = None,
+) -> CrackReport | None:
+    """From the cache alone where every result is there, which takes no Prefect run; else as a flow run."""
+    from flows.inspect_bridge import inspect_bridge
+    from tasks import run
+    from tasks.stage import NotYetKnown
+
+    events: list[run.Event] = []
+
+    def all_cached(event: run.Event) -> None:
+        if event.outcome == "will run":
+            raise NotAllCached
+        events.append(event)
+
+    try:
+        with run.running(run.Run(listener=all_cached, dry=True)):
+            report = inspect_bridge.fn(inspection, out, redo, photos, log)
+    except (NotAllCached, NotYetKnown):
+        use_server_that_answers()
+        with listening():
+            return inspect_bridge(inspection, out, redo, photos, log)
+    with StageLines() as lines:
+        for event in events:
+            lines(event)
+    return report
+
+
+def run_inspection(
+    inspection: str, folder: Path | None, redo: tuple[str, ...], photos: Path | None, log: Path | None
+) -> int:
+    from flows.external_flight import WaitingForFlight
+    from flows.inspection_file import read_inspection
+
+    name = read_inspection(Path(inspection)).name  # a mistake in it is told before anything starts
+    where = folder or Path("runs") / name
+    out.print(f"Inspecting {name}")
+    try:
+        report = run_flow(inspection, _text(folder), redo, _text(photos), _text(log))
+    except WaitingForFlight:
+        out.print(f"The plan is ready: {where / 'plan'}. Fly it, then:")
+        out.print(f"  hairline run {inspection} --photos DIR --log FILE")
+        return 3
+    say_results(report, where)
+    return 0
+
+
+def run_demo(scene: str, folder: Path | None) -> int:
+    from flows.opening import opened
+    from tasks.simulation.task import score, score_table, simulation_truth
+
+    out.print(f"Inspecting the simulated {scene}")
+    demo = f"demo:{scene}"
+    with opened(demo, _text(folder)) as run:
+        report = run_flow(demo, _text(folder))
+        if report is not None and run.inspection.simulation is not None:
+            truth = simulation_truth.bare(run.inspection.simulation)
+            out.print("\nAgainst the simulator's truth, which the inspection never reads:")
+            out.print(score_table(score.bare(report, truth)))
+    say_results(report, run.folder)
+    return 0
+
+
+def dry_run(inspection: str, folder: Path | None, redo: tuple[str, ...]) -> int:
+    """Say of each stage whether it is cached or will run; execute none."""
+    from flows.external_flight import WaitingForFlight
+    from flows.inspect_bridge import inspect_bridge
+    from tasks.stage import NotYetKnown
+
+    later = False
+    with listening(dry=True):
+        try:
+            inspect_bridge.fn(inspection, _text(folder), redo)
+        except NotYetKnown:
+            later = True
+        except WaitingForFlight:
+            out.print("  then it waits for the external flight")
+    if later:
+        out.print("  → every stage after these will run: its inputs are not known yet")
+    return 0
+
+
+def say_results(report: CrackReport | None, folder: Path) -> None:
+    """Where the results are; the last line is a warning where something was not inspected."""
+    if report is None:
+        out.print(f"\nThe plan: {folder / 'plan'}")
+        return
+    widths = [crack.width_max_mm for crack in report.cracks if crack.width_max_mm is not None]
+    widest = f", the widest {max(widths):.1f} mm" if widths else ""
+    out.print(f"\n{len(report.cracks)} cracks{widest}. Report: {folder / 'report' / 'index.html'}")
+    if report.not_inspected:
+        first = report.not_inspected[0]
+        more = (
+            f" (and {len(report.not_inspected) - 1} more, listed in the report)"
+            if (len(report.not_inspected) > 1)
+            else ""
+        )
+        text = f"Warning: not inspected: {first.item}: {first.what}{more}".replace("[", r"\[")
+        out.print(f"[yellow]{text}[/yellow]")
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)

@@ -1,0 +1,96 @@
+"""The inspection file that a user writes (YAML). Paths are relative to the file's own folder."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from schemas.camera import Camera
+from schemas.contract import Contract, Matrix4, Vector3
+from schemas.geodesy import GeoOrigin
+from schemas.settings import (
+    AssessSettings,
+    DetectSettings,
+    PatternSettings,
+    PlanSettings,
+    RegistrationSettings,
+    ReportSettings,
+    StitchSettings,
+    SurfaceSettings,
+)
+from schemas.vehicle import Vehicle
+
+
+class CameraInput(Contract):
+    """A camera by its lens or by its calibrated focal length; give one of the two."""
+
+    width_px: int = Field(gt=0)
+    height_px: int = Field(gt=0)
+    focal_px: float | None = Field(default=None, gt=0)
+    focal_mm: float | None = Field(default=None, gt=0)
+    sensor_width_mm: float | None = Field(default=None, gt=0)
+    cx_px: float | None = None
+    cy_px: float | None = None
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+    shutter_s: float = Field(default=1 / 1000, gt=0)
+    max_rate_hz: float = Field(default=1.0, gt=0)
+
+    @model_validator(mode="after")
+    def _one_focal_length(self) -> Self:
+        by_lens = self.focal_mm is not None and self.sensor_width_mm is not None
+        if by_lens == (self.focal_px is not None):
+            raise ValueError("give either focal_px, or focal_mm together with sensor_width_mm")
+        return self
+
+    def camera(self) -> Camera:
+        focal_px = self.focal_px or (self.focal_mm or 0.0) / (self.sensor_width_mm or 1.0) * self.width_px
+        known = self.model_dump(exclude={"focal_px", "focal_mm", "sensor_width_mm"})
+        return Camera(focal_px=focal_px, **known)
+
+
+class ScanInput(Contract):
+    file: str
+    unit: Literal["m", "mm", "cm", "ft", "in"] = "m"
+    position_m: Vector3 | None = None  # of the scanner, in the world
+    T_world_scan: Matrix4 | None = None
+
+
+class PhotoSet(Contract):
+    """A folder of photos of one surface (or of all planned surfaces, when they come from a flight)."""
+
+    folder: str
+    surface: str | None = None  # None: by the flight log's shots, else the folder's name
+    stitch: bool = True  # False: each photo stands for itself
+    gsd_mm_px: float | None = Field(default=None, gt=0)
+    stand_off_m: float | None = Field(default=None, gt=0)  # with a camera, the other way to say the GSD
+
+
+class SimulationInput(Contract):
+    scene: Literal["bridge", "wall"]
+    seed: int = 1
+
+
+class Inspection(Contract):
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")  # also the folder's name under runs/
+    simulation: SimulationInput | None = None  # a rehearsal: scans, vehicle and photos are simulated
+    scans: tuple[ScanInput, ...] = ()
+    flight: Literal["simulated", "vehicle", "external"] | None = None  # None: no flight
+    connection: str | None = None  # of `flight: vehicle`
+    mission: str = "1"  # a new id flies again
+    flight_log: str | None = None  # of an external flight
+    photos: tuple[PhotoSet, ...] = ()
+    camera: CameraInput | None = None
+    vehicle: Vehicle = Vehicle()
+    origin: GeoOrigin | None = None
+    home_m: Vector3 | None = None  # None: a free place beside the structure
+    registration: RegistrationSettings = RegistrationSettings()
+    surfaces: SurfaceSettings = SurfaceSettings()
+    plan: PlanSettings = PlanSettings()
+    stitch: StitchSettings = StitchSettings()
+    patterns: PatternSettings = PatternSettings()
+    detect: DetectSettings = DetectSettings()
+    assess: AssessSettings = AssessSettings()
+    report: ReportSettings = ReportSettings()

@@ -1,0 +1,41 @@
+"""The stitched image of one surface."""
+
+from typing import Literal
+
+from schemas.contract import Contract, Matrix3, Vector2
+from schemas.file import File
+from schemas.photo import Photo
+from schemas.problem import LeftOut
+from schemas.surface import Surface
+
+
+class PhotoPlacement(Contract):
+    name: str
+    status: Literal["solved", "placed", "rejected"]  # by matches; by its pose alone; not in the mosaic
+    reason: str = ""  # why it was placed or rejected
+    H_mosaic_photo: Matrix3 | None = None  # undistorted photo pixels to mosaic pixels
+    matches: int = 0
+    rms_px: float | None = None  # reprojection residual in the mosaic
+    gain: float = 1.0
+
+
+class Mosaic(Contract):
+    """Mosaic pixel (x, y) lies at u = origin_uv_m[0] + x·gsd, v = origin_uv_m[1] − y·gsd of its surface
+    (v is up, y down). Without a surface the frame is the mosaic's own plane. gsd_mm_px None: no scale is
+    known, and nothing can be said in millimetres."""
+
+    name: str  # of the surface or photo set
+    surface: Surface | None
+    image: File  # tiled TIFF, 8-bit RGB
+    coverage: File  # tiled TIFF, 8-bit, 255 where a photo covers the pixel: blank is known, not guessed
+    source: File  # tiled TIFF, 16-bit, 1 + index into `photos` of the photo each pixel comes from
+    width_px: int
+    height_px: int
+    gsd_mm_px: float | None
+    scale_from: str  # "poses", "stated GSD", "GPS", "none"
+    origin_uv_m: Vector2
+    photos: tuple[Photo, ...]
+    placements: tuple[PhotoPlacement, ...]  # one a photo, in the order of `photos`
+    covered_m2: float | None
+    rms_px: float | None
+    left_out: tuple[LeftOut, ...] = ()

@@ -1,0 +1,79 @@
+"""Every setting of every stage, its default explained on its line."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.contract import Contract
+
+
+class RegistrationSettings(Contract):
+    voxel_m: float = Field(default=0.02, gt=0)  # merged model's point spacing; fine for planes of a bridge
+    tau_m: float = Field(default=0.10, gt=0)  # paper's τ: points closer than this overlap
+    min_overlap: float = Field(default=0.10, gt=0, le=1)  # below this two scans are not tied to each other
+    seed: int = 0
+
+
+class SurfaceSettings(Contract):
+    noise_filter: bool = True  # paper: remove sparse outliers
+    voxel_m: float | None = Field(default=0.05, gt=0)  # paper: equal density; None switches it off
+    clustering: bool = True  # paper: trim isolated groups
+    distance_m: float = Field(default=0.02, gt=0)  # RANSAC inlier distance, ~5σ of a terrestrial scanner
+    min_area_m2: float = Field(default=0.5, gt=0)  # smaller patches are no surface to inspect
+    epsilon_m: float = Field(default=0.5, gt=0)  # paper's ε: obstacles are more than this apart
+    seed: int = 0
+
+
+class PlanSettings(Contract):
+    smallest_crack_mm: float = Field(default=0.3, gt=0)  # to be detected; its width is one GSD
+    gsd_mm_px: float | None = Field(default=None, gt=0)  # None: from smallest_crack_mm
+    overlap: float = Field(default=0.6, ge=0.1, lt=0.95)  # between neighbours, both axes, before widening
+    max_incidence_deg: float = Field(default=45.0, gt=0, lt=80)  # more oblique views are not counted
+    voxel_m: float = Field(default=0.25, gt=0)  # occupancy grid
+    a1: float = Field(default=1.0, gt=0)  # paper's weights of a step east-west,
+    a2: float = Field(default=1.0, gt=0)  # north-south
+    a3: float = Field(default=1.0, gt=0)  # and up-down
+    surfaces: tuple[str, ...] | None = None  # names to inspect; None: all but the ground
+    min_altitude_m: float = Field(default=0.5, ge=0)  # above the ground, scanned or inferred from around it
+    max_altitude_m: float = Field(default=120.0, gt=0)  # above the ground
+
+
+class FlightSettings(Contract):
+    connection: str | None = None  # "udpin:127.0.0.1:14550", "tcp:…", "/dev/ttyUSB0"; None: simulated vehicle
+    timeout_s: float = Field(default=30.0, gt=0)  # without a heartbeat for this long the vehicle is lost
+
+
+class StitchSettings(Contract):
+    features: int = Field(default=4000, ge=100)  # most SIFT features of a photo
+    gsd_mm_px: float | None = Field(default=None, gt=0)  # states the scale; None: from poses or GPS
+    ransac_px: float = Field(default=3.0, gt=0)  # inlier distance of the homography
+    min_sharpness: float | None = None  # None: photos far below their neighbours are rejected as blurred
+
+
+class PatternSettings(Contract):
+    remove: bool = True  # off where no markers were stuck on and the surface is colourful
+    margin_px: int = Field(default=3, ge=0)  # grown around each marker
+
+
+class DetectSettings(Contract):
+    method: Literal["hairline", "paper", "global"] = "hairline"
+    window_px: int | None = Field(default=None, ge=3)  # paper's N; cracks up to N/2 wide; None: 63
+    k: float = Field(default=0.5, gt=0, lt=1)  # paper; `hairline` lowers it where the surface is smooth
+    R: float = Field(default=128.0, gt=0)  # paper
+    global_threshold: int | None = Field(default=None, ge=1, le=254)  # of `global`; None: from the peaks
+    baselines: bool = False  # also the global thresholds 125, 155 and the peaks' own, for the report
+    min_length_mm: float = Field(default=50.0, gt=0)  # shorter things are no cracks where a scale is known
+    min_length_px: float = Field(default=30.0, gt=0)  # and where none is
+
+
+class AssessSettings(Contract):
+    """Severity by width. The limits are those of common bridge manuals; set your own authority's."""
+
+    fine_mm: float = 0.2  # below: hairline
+    medium_mm: float = 0.5  # below: fine
+    wide_mm: float = 1.0  # below: medium; from here: wide
+
+
+class ReportSettings(Contract):
+    close_up_mm: float = Field(default=300.0, gt=0)  # side of the picture around each crack
+    baselines: bool = False  # the paper's panels side by side

@@ -1,0 +1,102 @@
+"""Stages: the cracks' kind and severity, what was inspected and what was not; and the report of it all."""
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from artifacts import report as report_pages
+from artifacts import store
+from artifacts.page import Page
+from schemas.crack import Measurement
+from schemas.crack_report import CrackReport
+from schemas.detection import Detection, Patterns
+from schemas.evaluation import Evaluation
+from schemas.file import Folder
+from schemas.flight_log import FlightLog
+from schemas.flight_plan import FlightPlan
+from schemas.inspection import Inspection
+from schemas.mosaic import Mosaic
+from schemas.problem import LeftOut
+from schemas.registered_model import RegisteredModel
+from schemas.settings import AssessSettings
+from schemas.structure import Structure
+from schemas.surface import Surface
+from tasks.assessment.evaluation import Mask
+from tasks.assessment.evaluation import evaluate as evaluate_masks
+from tasks.assessment.report import report as report_of
+from tasks.stage import stage
+
+
+def pages(inputs: Mapping[str, Any], result: CrackReport) -> list[Page]:
+    rows = [
+        {
+            "surface": one.name,
+            "inspected_m2": None if one.inspected_m2 is None else round(one.inspected_m2, 2),
+            "area_m2": None if one.area_m2 is None else round(one.area_m2, 2),
+            "photos": one.photos,
+            "cracks": one.cracks,
+        }
+        for one in result.surfaces
+    ]
+    missing = [{"item": m.item, "what": m.what, "remedy": m.remedy} for m in result.not_inspected]
+    shown = [Page(key="surfaces-inspected", table=rows)]
+    return [*shown, Page(key="not-inspected", table=missing)] if missing else shown
+
+
+@stage(pages=pages)
+def assess(
+    inspection: str,
+    method: str,
+    mosaics: tuple[Mosaic, ...],
+    measurements: tuple[Measurement, ...],
+    patterns: tuple[Patterns, ...],
+    surfaces: tuple[Surface, ...],
+    left_out: tuple[LeftOut, ...],
+    settings: AssessSettings,
+) -> CrackReport:
+    """The report's content: cracks classified, surfaces with their areas, and what was not inspected."""
+    return report_of(inspection, method, mosaics, measurements, patterns, surfaces, left_out, settings)
+
+
+def evaluate(method: str, pairs: Iterable[tuple[Mask, Mask]]) -> tuple[Evaluation, ...]:
+    """Agreement of (found, drawn) masks, each (H, W) bool; no stage: only the command line asks for it."""
+    return evaluate_masks(method, pairs)
+
+
+def link(inputs: Mapping[str, Any], _folder: Folder) -> list[Page]:
+    host = os.environ.get("HAIRLINE_REPORT_URL", "http://127.0.0.1:4201")
+    name = inputs["inspection"].name
+    return [Page(key="report", description=f"Report of {name}", link=f"{host}/{name}/report/index.html")]
+
+
+@stage(pages=link)
+def write_report(
+    inspection: Inspection,
+    report: CrackReport,
+    mosaics: tuple[Mosaic, ...],
+    measurements: tuple[Measurement, ...],
+    patterns: tuple[Patterns, ...],
+    detections: tuple[Detection, ...],
+    structure: Structure | None,
+    model: RegisteredModel | None,
+    plan: FlightPlan | None,
+    log: FlightLog | None,
+) -> Folder:
+    """index.html for people, cracks.csv and cracks.json for other programs."""
+    files = store.current()
+    with files.scratch() as folder:
+        report_pages.write_report(
+            folder,
+            inspection=inspection,
+            report=report,
+            mosaics=mosaics,
+            measurements=measurements,
+            patterns=patterns,
+            detections=detections,
+            structure=structure,
+            model=model,
+            plan=plan,
+            log=log,
+            open_file=files.path,
+        )
+        return files.put_folder(folder)

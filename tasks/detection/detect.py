@@ -1,0 +1,125 @@
+"""Cracks of one image by the method that the settings name."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from schemas.detection import Peaks
+from schemas.raster import ArrayRaster, Pixels, Progress, Raster
+from schemas.settings import DetectSettings
+from tasks.detection.bands import by_bands
+from tasks.detection.components import long_and_thin
+from tasks.detection.edges import without_soft
+from tasks.detection.global_threshold import PAPER, Histogram, darker_than, from_peaks, otsu
+from tasks.detection.hairline import SEED, Scale, dark_levels
+from tasks.detection.joints import Joint, without_joints
+from tasks.detection.paper import paper_mask
+from tasks.detection.sauvola import Mask, grey_of
+
+WINDOW_PX = 63  # N: best on our development photos (METHOD); holds cracks of up to half of it, 31 px
+JOINT_LENGTHS = 8.0  # what is straight over this many times the least length of a crack is a joint
+
+
+@dataclass(frozen=True)
+class DetectionArrays:
+    mask: Mask  # (H, W), True on cracks
+    inspected_px: int
+    joints: tuple[Joint, ...] = ()  # straight lines that are dark but no cracks
+    stains: tuple[tuple[float, float], ...] = ()  # where something dark has soft edges, x, y
+
+
+def detect_image(
+    rgb: Pixels,
+    valid: Mask | None,
+    settings: DetectSettings,
+    gsd_mm_px: float | None,
+    peaks: Peaks | None = None,
+) -> DetectionArrays:
+    """Cracks of an image in memory. rgb: (H, W, 3) uint8; valid: (H, W), None where all of it is.
+
+    peaks: of the red channel; the methods `paper` and `global` use them where they are known."""
+    return detect_raster(ArrayRaster(rgb, valid), settings, gsd_mm_px, peaks or Peaks())
+
+
+def detect_raster(
+    raster: Raster,
+    settings: DetectSettings,
+    gsd_mm_px: float | None,
+    peaks: Peaks,
+    on_progress: Progress | None = None,
+) -> DetectionArrays:
+    """Cracks of an image of any size, read in bands."""
+    window = (settings.window_px or WINDOW_PX) | 1
+    if settings.method == "paper":
+        mask = paper_mask(raster, peaks, window, settings.k, settings.R, on_progress)
+        return DetectionArrays(mask, count_valid(raster))
+    if settings.method == "global":
+        threshold = settings.global_threshold or from_peaks(red_histogram(raster), peaks)
+        return DetectionArrays(global_mask(raster, threshold), count_valid(raster))
+    return _hairline(raster, settings, Scale.of_window(window), gsd_mm_px, on_progress)
+
+
+def _hairline(
+    raster: Raster,
+    settings: DetectSettings,
+    scale: Scale,
+    gsd_mm_px: float | None,
+    on_progress: Progress | None,
+) -> DetectionArrays:
+    levels = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
+    lit = np.zeros_like(levels)  # grey, 0 where nothing is known: no lit surface is black
+
+    def band(y0: int, y1: int, top: int, bottom: int) -> int:
+        grey = grey_of(raster.rgb(top, bottom, 0, raster.width_px))
+        valid = raster.valid(top, bottom, 0, raster.width_px)
+        inner = slice(y0 - top, y1 - top)
+        levels[y0:y1] = dark_levels(grey, valid, scale, settings.k, settings.R)[inner]
+        lit[y0:y1] = np.where(valid, grey, 0)[inner]
+        return int(valid[inner].sum())
+
+    inspected = sum(by_bands(raster.height_px, scale.halo, band, on_progress))
+    least_px = settings.min_length_px if gsd_mm_px is None else settings.min_length_mm / gsd_mm_px
+    mask = long_and_thin(levels, SEED, least_px)
+    mask, stains = without_soft(mask, lit, (levels == 0) & (lit > 0))
+    mask, joints = without_joints(mask, JOINT_LENGTHS * least_px, least_px)
+    mask = long_and_thin(np.where(mask, levels, np.uint8(0)), SEED, least_px)
+    return DetectionArrays(mask, inspected, tuple(joints), tuple(stains))
+
+
+def baselines(raster: Raster, peaks: Peaks) -> list[tuple[str, Mask]]:
+    """The global thresholds for the report, by name."""
+    histogram = red_histogram(raster)
+    thresholds = [(f"T = {t}", float(t)) for t in PAPER]
+    thresholds += [("from the peaks", from_peaks(histogram, peaks)), ("Otsu", otsu(histogram))]
+    return [(name, global_mask(raster, t)) for name, t in thresholds]
+
+
+def global_mask(raster: Raster, threshold: float) -> Mask:
+    """Valid pixels whose grey level lies below one threshold for the whole image."""
+    mask = np.zeros((raster.height_px, raster.width_px), dtype=bool)
+
+    def band(y0: int, y1: int, _top: int, _bottom: int) -> None:
+        grey = grey_of(raster.rgb(y0, y1, 0, raster.width_px))
+        mask[y0:y1] = darker_than(grey, raster.valid(y0, y1, 0, raster.width_px), threshold)
+
+    by_bands(raster.height_px, 0, band)
+    return mask
+
+
+def red_histogram(raster: Raster) -> Histogram:
+    """(256,) valid pixels of each red level."""
+
+    def band(y0: int, y1: int, _top: int, _bottom: int) -> npt.NDArray[np.int64]:
+        red = raster.rgb(y0, y1, 0, raster.width_px)[..., 0]
+        return np.bincount(red[raster.valid(y0, y1, 0, raster.width_px)], minlength=256)
+
+    histogram: Histogram = np.sum(by_bands(raster.height_px, 0, band), axis=0)
+    return histogram
+
+
+def count_valid(raster: Raster) -> int:
+    def band(y0: int, y1: int, _top: int, _bottom: int) -> int:
+        return int(raster.valid(y0, y1, 0, raster.width_px).sum())
+
+    return sum(by_bands(raster.height_px, 0, band))

@@ -1,0 +1,81 @@
+"""Stage: find the cracks of a mosaic."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+
+from artifacts import store
+from artifacts.page import Page, page_key
+from artifacts.picture import mask_markdown
+from artifacts.raster import MosaicRaster, write_mask
+from schemas.detection import Detection, Patterns
+from schemas.file import File
+from schemas.mosaic import Mosaic
+from schemas.problem import BadInput
+from schemas.settings import DetectSettings
+from tasks.detection.detect import baselines, detect_raster
+from tasks.stage import progress, stage
+
+
+def pages(inputs: Mapping[str, Any], detection: Detection) -> list[Page]:
+    mosaic: Mosaic = inputs["mosaic"]
+    masks = [(detection.method, detection.mask), *detection.baselines]
+    pictures = [f"**{name}**\n\n{mask_markdown(mosaic, mask, (255, 0, 0))}" for name, mask in masks]
+    title = f"### Cracks of {mosaic.name}: {detection.crack_px} of {detection.inspected_px} px"
+    return [Page(key=page_key("detection", mosaic.name), markdown="\n\n".join([title, *pictures]))]
+
+
+@stage(pages=pages)
+def detect(mosaic: Mosaic, patterns: Patterns, settings: DetectSettings) -> Detection:
+    """Crack pixels by the settings' method; with `baselines` the paper's global thresholds as well.
+
+    The paper's own method looks at all of the image, markers included, and takes them out by t1 and t2."""
+    files = store.current()
+    taken_out = None if settings.method == "paper" else files.path(patterns.mask)
+    image, coverage = files.path(mosaic.image), files.path(mosaic.coverage)
+    with MosaicRaster(image, coverage, mosaic.name, taken_out) as raster, files.scratch() as folder:
+        found = detect_raster(raster, settings, mosaic.gsd_mm_px, patterns, progress)
+        write_mask(found.mask, folder / "cracks.png")
+        mask = files.put(folder / "cracks.png")
+        beside = []
+        for n, (name, baseline) in enumerate(baselines(raster, patterns) if settings.baselines else ()):
+            write_mask(baseline, folder / f"baseline-{n}.png")
+            beside.append((name, files.put(folder / f"baseline-{n}.png")))
+    return Detection(
+        mask=mask,
+        method=settings.method,
+        crack_px=int(found.mask.sum()),
+        inspected_px=found.inspected_px,
+        rejected=(
+            *((joint.position_px, _reason(joint.length_px, mosaic)) for joint in found.joints),
+            *((position, "a stain or shadow: its edges are soft") for position in found.stains),
+        ),
+        baselines=tuple(beside),
+    )
+
+
+def _reason(length_px: float, mosaic: Mosaic) -> str:
+    if mosaic.gsd_mm_px is None:
+        return f"a joint: straight over {length_px:.0f} px"
+    return f"a joint: straight over {length_px * mosaic.gsd_mm_px / 1000:.2f} m"
+
+
+def given_mask(mosaic: Mosaic, mask: File, name: str) -> Detection:
+    """A mask that somebody drew or another program made, as a detection. Raises BadInput by name."""
+    drawn = cv2.imread(str(store.current().path(mask)), cv2.IMREAD_GRAYSCALE)
+    if drawn is None:
+        raise BadInput(name, "is no image", "Give the mask as PNG, not 0 where there is a crack")
+    if drawn.shape != (mosaic.height_px, mosaic.width_px):
+        raise BadInput(
+            name,
+            f"is {drawn.shape[1]}×{drawn.shape[0]} px but its image {mosaic.width_px}×{mosaic.height_px}",
+            "Give the mask of this very image",
+        )
+    with store.current().scratch() as folder:
+        write_mask(np.asarray(drawn) > 0, folder / "cracks.png")
+        entered = store.current().put(folder / "cracks.png")
+    return Detection(
+        mask=entered, method="given mask", crack_px=int((drawn > 0).sum()), inspected_px=int(drawn.size)
+    )

@@ -1,0 +1,216 @@
+"""Fly a mission on ArduCopter: prepare on the ground, arm, AUTO, follow until it has landed and disarmed."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from schemas.flight_plan import FlightPlan
+from schemas.mission import MissionItem
+from schemas.problem import BadInput
+from tasks.flight.link import Link, LinkLost
+from tasks.flight.mavlink_messages import MessageReader, vehicle_name
+from tasks.flight.place import Place
+from tasks.flight.recording import Recorder, Recording, archive
+from tasks.flight.upload import abandon_mission, upload_mission
+
+AUTO, GUIDED = 3, 4  # ArduCopter's modes
+COPTERS = (
+    mavlink.MAV_TYPE_QUADROTOR,
+    mavlink.MAV_TYPE_COAXIAL,
+    mavlink.MAV_TYPE_HELICOPTER,
+    mavlink.MAV_TYPE_HEXAROTOR,
+    mavlink.MAV_TYPE_OCTOROTOR,
+    mavlink.MAV_TYPE_TRICOPTER,
+    mavlink.MAV_TYPE_DODECAROTOR,
+)
+RATES_HZ = {
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 10.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+}
+FROM_HOME_M = 20.0  # farther from the planned home, the way to the first waypoint was never checked
+ARM_RETRY_S = 2.0
+START_S = 20.0  # from an accepted start to a vehicle that says it is armed
+AIRBORNE_M = 0.5
+
+
+class FlightLost(Exception):
+    """The link broke in flight; what was recorded until then."""
+
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(recording)
+        self.recording = recording
+
+
+class Flight:
+    """One flight over one link. `prepare` on the ground, then `execute` with a recorder."""
+
+    def __init__(self, link: Link, plan: FlightPlan, items: tuple[MissionItem, ...]) -> None:
+        self.link, self.plan, self.items = link, plan, items
+        self.place = Place.of_plan(plan)
+        self.reader = MessageReader()
+        self.warnings: list[str] = []  # what the vehicle said is wrong
+        self._recorder: Recorder | None = None
+        self._next_recorder: Recorder | None = None
+        link.on_message = self._on_message
+
+    # -- on the ground ---------------------------------------------------------------------------------
+
+    def prepare(self) -> str:
+        """Find the vehicle, check it, upload the mission; returns the vehicle's name. Raises BadInput."""
+        heartbeat = self.link.find_vehicle()
+        self.reader.source = self.link.source
+        self._check_kind(heartbeat)
+        self._ask_name()
+        for message, rate_hz in RATES_HZ.items():
+            self.link.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, 1e6 / rate_hz, attempts=4)
+        self._check_place()
+        upload_mission(self.link, self.items)
+        return self.reader.recording.vehicle
+
+    def _check_kind(self, heartbeat: Any) -> None:
+        if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA or heartbeat.type not in COPTERS:
+            raise BadInput(
+                self.link.url,
+                "the vehicle that answers is no ArduCopter, and the mission is made for one",
+                "Connect an ArduCopter, or fly the exported mission with the vehicle's own ground station and"
+                " bring its log",
+            )
+        if heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED:
+            raise BadInput(
+                self.link.url, "the vehicle is armed already", "Land and disarm it, then fly the plan again"
+            )
+
+    def _ask_name(self) -> None:
+        for _ in range(3):
+            self.link.command(mavlink.MAV_CMD_DO_SEND_BANNER, attempts=4)
+            until = time.monotonic() + 1.0
+            while time.monotonic() < until:
+                if vehicle_name(self.reader.recording.vehicle) is not None:
+                    return
+                self.link.receive(0.1)
+
+    def _check_place(self) -> None:
+        fixes = self.reader.recording.fixes
+        until = time.monotonic() + 2 * self.link.timeout_s  # a vehicle just switched on looks for satellites
+        while not fixes and time.monotonic() < until:
+            self.link.receive(0.2)
+        if not fixes:
+            raise BadInput(
+                self.link.url,
+                "the vehicle does not know where it is",
+                "Wait until it has a GPS position, then fly the plan again",
+            )
+        x, y, _ = self.place.world_m(fixes[-1])
+        east, north = x - self.plan.home_m[0], y - self.plan.home_m[1]
+        if (east**2 + north**2) ** 0.5 > FROM_HOME_M:
+            latitude, longitude, altitude = self.plan.origin.to_geographic(self.plan.home_m)
+            raise BadInput(
+                self.link.url,
+                f"the vehicle stands {(east**2 + north**2) ** 0.5:.0f} m from the plan's home",
+                f"Carry it to {latitude:.7f}, {longitude:.7f}, or plan again with another home_m or origin"
+                f" (start ArduPilot's simulator with --home {latitude:.7f},{longitude:.7f},{altitude:.0f},0)",
+            )
+
+    # -- in the air ------------------------------------------------------------------------------------
+
+    def execute(self, recorder: Recorder, on_progress: Callable[[float], None]) -> Recording:
+        """Arm, fly, follow to disarming; everything from the arming on goes to the recorder.
+
+        Raises BadInput where the flight does not begin (the mission is cleared then), FlightLost where the
+        link breaks in the air.
+        """
+        try:
+            self._arm(recorder)
+            self._start()
+        except LinkLost:
+            raise FlightLost(self.reader.close()) from None
+        except BaseException:
+            self._stand_down()
+            raise
+        try:
+            self._follow(on_progress)
+        except LinkLost:
+            raise FlightLost(self.reader.close()) from None
+        recording = self.reader.close()
+        if max((fix.height_m for fix in recording.fixes), default=0.0) < AIRBORNE_M:
+            self._stand_down()
+            raise self._problem("the vehicle armed but did not take off")
+        return recording
+
+    def _arm(self, recorder: Recorder) -> None:
+        self._set_mode(GUIDED)  # in which it arms without a radio's throttle
+        until = time.monotonic() + 2 * self.link.timeout_s  # filters settle for a while after power-up
+        self.warnings.clear()
+        self._next_recorder = recorder
+        while True:
+            result = self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+            if result == mavlink.MAV_RESULT_ACCEPTED:
+                return
+            if time.monotonic() + ARM_RETRY_S > until:
+                raise self._problem("the vehicle refuses to arm")
+            self.link.expect((), ARM_RETRY_S)
+
+    def _set_mode(self, mode: int) -> None:
+        custom = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        if self.link.command(mavlink.MAV_CMD_DO_SET_MODE, custom, mode) != mavlink.MAV_RESULT_ACCEPTED:
+            name = "AUTO" if mode == AUTO else "GUIDED"
+            raise self._problem(f"the vehicle does not change to {name}")
+
+    def _start(self) -> None:
+        self._set_mode(AUTO)
+        result = self.link.command(mavlink.MAV_CMD_MISSION_START)
+        if result != mavlink.MAV_RESULT_ACCEPTED and not self.reader.recording.armed_s:
+            raise self._problem("the vehicle does not start the mission")
+
+    def _follow(self, on_progress: Callable[[float], None]) -> None:
+        began = time.monotonic()
+        told = -1
+        while self.reader.armed or not self.reader.recording.armed_s:
+            self.link.receive(1.0)
+            if self.reader.mission_item != told:
+                told = self.reader.mission_item
+                on_progress(min(1.0, told / len(self.items)))
+            if not self.reader.recording.armed_s and time.monotonic() - began > START_S:
+                return
+
+    def _stand_down(self) -> None:
+        """On the ground, after a failure: motors off, no mission left behind."""
+        try:
+            self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, attempts=3)
+        except LinkLost:
+            return
+        abandon_mission(self.link)
+
+    def _problem(self, what: str) -> BadInput:
+        said = "; ".join(dict.fromkeys(self.warnings[-5:]))
+        return BadInput(
+            self.link.url,
+            f"{what}; it says: {said}" if said else what,
+            "Make the vehicle ready (its ground station shows the same messages), then fly the plan again",
+        )
+
+    # -- what is heard ---------------------------------------------------------------------------------
+
+    def _on_message(self, message: Any) -> None:
+        kind = message.get_type()
+        if kind == "STATUSTEXT" and message.severity <= mavlink.MAV_SEVERITY_WARNING:
+            self.warnings.append(message.text.strip())
+        elif kind == "COMMAND_ACK" and self._recorder is None and _armed(message):
+            self._recorder = self._next_recorder
+            self.reader.recording.fixes.clear()
+        read = self.reader.read(message)
+        if self._recorder is not None:
+            time_ns = round(self.reader.clock_s * 1000) * 1_000_000
+            self._recorder.frame(time_ns, bytes(message.get_msgbuf()))
+            archive(self._recorder, time_ns, read, self.place.world_m)
+
+
+def _armed(ack: Any) -> bool:
+    return bool(
+        ack.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and ack.result == mavlink.MAV_RESULT_ACCEPTED
+    )

@@ -1,0 +1,146 @@
+"""Fly a plan on a vehicle, or understand the log of a flight that others flew."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from artifacts import store
+from artifacts.flight_log import MAVLINK, ORIGINAL, FlightArchive, about, messages
+from artifacts.page import Page
+from schemas.file import File
+from schemas.flight_log import FlightLog
+from schemas.flight_plan import FlightPlan
+from schemas.mission import mission_items
+from schemas.problem import BadInput
+from tasks.flight.fly import Flight, FlightLost
+from tasks.flight.link import Link
+from tasks.flight.read_log import Kind, kind_of_log, read_log
+from tasks.flight.recording import Recording
+from tasks.flight.telemetry_log import read_frames
+from tasks.flight.track import compare_with_plan
+from tasks.stage import progress, stage
+
+ARCHIVE = "flight.mcap"
+
+
+def flight_pages(inputs: Mapping[str, Any], log: FlightLog) -> Sequence[Page]:
+    errors = [
+        {"where": e.what, "rms m": round(e.rms_m, 3), "largest m": round(e.largest_m, 3)} for e in log.errors
+    ]
+    shots = [
+        {
+            "photo": s.photo,
+            "surface": s.surface or "",
+            "time s": s.time_s,
+            "position m": ", ".join(f"{v:.2f}" for v in s.pose.position_m),
+            "yaw deg": round(s.pose.yaw_deg, 1),
+            "reported": "yes" if s.reported else "from the track",
+        }
+        for s in log.shots
+    ]
+    summary = (
+        f"**{log.vehicle}**, {log.duration_s / 60:.1f} min, {len(log.shots)} shots, {len(log.missed)} missed"
+        + "".join(f"\n- not shot: {photo}" for photo in log.missed)
+    )
+    return [
+        Page(key="flight", description="The flight", markdown=summary),
+        Page(key="flight-track-error", description="Planned against flown path", table=errors),
+        Page(key="flight-shots", description="Where each photo was taken", table=shots),
+    ]
+
+
+@stage(unkeyed=("connection", "timeout_s"), pages=flight_pages, effects=True)
+def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> FlightLog:
+    """Fly a plan on the vehicle at `connection` and archive the flight.
+
+    mission: id of this flight; another id flies again. timeout_s: a vehicle silent for this long is lost.
+    """
+    items = mission_items(plan)
+    with store.current().scratch() as folder, Link(connection, timeout_s) as link:
+        flight = Flight(link, plan, items)
+        vehicle = flight.prepare()
+        path = folder / ARCHIVE
+        try:
+            with FlightArchive(path, _about(vehicle, "mavlink", plan)) as recorder:
+                recording = flight.execute(recorder, progress)
+        except FlightLost as lost:
+            raise _lost(connection, timeout_s, lost.recording, store.current().put(path)) from None
+        recording.vehicle = vehicle
+        return _flight_log(recording, store.current().put(path), plan, connection)
+
+
+@stage(pages=flight_pages)
+def import_log(log: File, name: str, plan: FlightPlan | None) -> FlightLog:
+    """Understand the log of an external flight (tlog, BIN, ulg, or an archived mcap)."""
+    path = store.current().path(log)
+    kind = kind_of_log(path, name)
+    with store.current().scratch() as folder:
+        if kind == "mcap":
+            return _flight_log(_read_archive(path, name, folder), log, plan, name)
+        converted = folder / ARCHIVE
+        recording = _converted(path, kind, name, converted)
+        return _flight_log(recording, store.current().put(converted), plan, name)
+
+
+def convert(log: Path, out: Path) -> None:
+    """Convert a flight log (tlog, BIN, ulg) to MCAP, whole. BadInput where it is none or damaged."""
+    kind = kind_of_log(log, log.name)
+    if kind == "mcap":
+        raise BadInput(log.name, "is an MCAP file already", "Use it as it is")
+    unfinished = out.with_name(f".{out.name}.unfinished")
+    try:
+        _converted(log, kind, log.name, unfinished)
+        unfinished.replace(out)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _converted(path: Path, kind: Kind, name: str, out: Path) -> Recording:
+    with FlightArchive(out, {"log": kind}) as recorder:
+        return read_log(path, kind, name, recorder)
+
+
+def _read_archive(path: Path, name: str, folder: Path) -> Recording:
+    """What an archive holds: its frames, or the original log inside it."""
+    stated = about(path, name)
+    kind = stated.get("log")
+    if kind in ("dataflash", "ulog"):
+        original = folder / "original"
+        with original.open("wb") as stream:
+            stream.writelines(data for topic, _, data in messages(path) if topic == ORIGINAL)
+        return read_log(original, "dataflash" if kind == "dataflash" else "ulog", name)
+    recording = read_frames((time_ns, data) for topic, time_ns, data in messages(path) if topic == MAVLINK)
+    recording.vehicle = stated.get("vehicle", recording.vehicle)
+    return recording
+
+
+def _flight_log(recording: Recording, archive: File, plan: FlightPlan | None, name: str) -> FlightLog:
+    found = compare_with_plan(recording, plan, name)
+    return FlightLog(
+        archive=archive,
+        vehicle=recording.vehicle,
+        duration_s=found.duration_s,
+        track=found.track,
+        shots=found.shots,
+        errors=found.errors,
+        missed=found.missed,
+    )
+
+
+def _about(vehicle: str, kind: str, plan: FlightPlan) -> dict[str, str]:
+    origin = plan.origin
+    return {
+        "log": kind,
+        "vehicle": vehicle,
+        "origin": f"{origin.latitude_deg} {origin.longitude_deg} {origin.altitude_m}",
+    }
+
+
+def _lost(connection: str, timeout_s: float, recording: Recording, archive: File) -> BadInput:
+    flown_s = recording.fixes[-1].time_s - recording.fixes[0].time_s if recording.fixes else 0.0
+    return BadInput(
+        connection,
+        f"the vehicle was not heard for {timeout_s:g} s, {flown_s:.0f} s after arming",
+        "It follows its own failsafe. What was received is kept in"
+        f" {store.current().path(archive)}; with the vehicle's own log, continue as an external flight",
+    )

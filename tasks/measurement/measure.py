@@ -1,0 +1,109 @@
+"""Cracks of one image: from a mask to centrelines, lengths, widths and directions, in pixels."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
+
+from schemas.raster import Progress, Raster
+from tasks.measurement.centreline import Points, arc_length, normals, orientation_deg, smooth, straight_ends
+from tasks.measurement.profiles import Across, across
+from tasks.measurement.psf import estimate_psf_px
+from tasks.measurement.skeleton import Mask, crack_paths
+from tasks.measurement.width_profile import Widths, measure_widths
+
+LEAST_HALF_PX, LARGEST_HALF_PX = 8.0, 60.0  # half length of a profile
+BESIDE_PX = 6.0  # of a profile lie beyond the crack's edges, at least
+FAINTEST = 0.03  # median darkness of a crack in linear light: what is fainter is no crack
+
+
+class MeasuredCrack(NamedTuple):
+    centreline: Points  # (N, 2) steps of about 1 px
+    along_px: npt.NDArray[np.float64]  # (N,)
+    widths: Widths
+    network: int
+
+    @property
+    def length_px(self) -> float:
+        return float(self.along_px[-1])
+
+    @property
+    def orientation_deg(self) -> float:
+        return orientation_deg(self.centreline)
+
+    @property
+    def middle_px(self) -> tuple[float, float]:
+        at = int(np.searchsorted(self.along_px, self.length_px / 2))
+        return float(self.centreline[at, 0]), float(self.centreline[at, 1])
+
+
+class MeasuredImage(NamedTuple):
+    cracks: list[MeasuredCrack]  # by position: left to right, then top to bottom
+    rejected: list[tuple[tuple[float, float], str]]
+    psf_px: float
+
+
+class _Line(NamedTuple):
+    centreline: Points
+    profiles: Across
+    network: int
+
+
+def measure_cracks(
+    raster: Raster, mask: Mask, least_px: float, gap_px: float, on_progress: Progress | None = None
+) -> MeasuredImage:
+    """mask: (H, W) crack pixels of the raster. Paths shorter than `least_px` are no cracks; gaps of up to
+    `gap_px` within a crack are bridged."""
+    thickness = 2.0 * cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
+    lines, rejected = [], []
+    paths = crack_paths(mask, least_px, gap_px)
+    for n, path in enumerate(paths):
+        line = _line(raster, path.points, thickness, path.network)
+        middle = path.points[len(path.points) // 2]
+        position = (float(middle[0]), float(middle[1]))
+        if line.profiles.usable.sum() < 3:
+            rejected.append((position, "at the rim of what the photos cover"))
+        elif np.median(_peak(line.profiles)) < FAINTEST:
+            rejected.append((position, "no darker than what lies beside it"))
+        else:
+            lines.append(line)
+        if on_progress is not None:
+            on_progress((n + 1) / len(paths))
+    psf_px = estimate_psf_px([(p.offsets_px, p.darkness[p.usable]) for _, p, _ in lines])
+    cracks = [_measured(line, psf_px) for line in lines]
+    return MeasuredImage(sorted(cracks, key=lambda crack: crack.middle_px), rejected, psf_px)
+
+
+def _line(raster: Raster, path: Points, thickness: npt.NDArray[np.float32], network: int) -> _Line:
+    """Centreline through the darkest of the profiles, and the profiles across it."""
+    at = np.rint(path).astype(int)
+    inside = (at[:, 1] < thickness.shape[0]) & (at[:, 0] < thickness.shape[1])
+    width = float(np.percentile(thickness[at[inside, 1], at[inside, 0]], 75))
+    half = float(np.clip(1.0 * width + BESIDE_PX, LEAST_HALF_PX, LARGEST_HALF_PX))
+    centreline = smooth(straight_ends(path, round(width / 2)))
+    profiles = across(raster, centreline, half)
+    near = np.abs(profiles.offsets_px) <= width / 2 + 2.0
+    dark = np.maximum(profiles.darkness[:, near], 0.0)
+    shift = (dark * profiles.offsets_px[near]).sum(axis=1) / np.maximum(dark.sum(axis=1), 1e-3)
+    shift = gaussian_filter1d(np.where(profiles.usable, shift, 0.0), 3.0, mode="nearest")
+    centreline = smooth(centreline + shift[:, None] * normals(centreline))
+    return _Line(centreline, across(raster, centreline, half), network)
+
+
+def _peak(profiles: Across) -> npt.NDArray[np.float64]:
+    """Darkness in the middle of each profile."""
+    middle = np.abs(profiles.offsets_px) <= 1.0
+    return np.asarray(profiles.darkness[np.ix_(profiles.usable, middle)].mean(axis=1))
+
+
+def _measured(line: _Line, psf_px: float) -> MeasuredCrack:
+    profiles = line.profiles
+    known = measure_widths(profiles.offsets_px, profiles.darkness[profiles.usable], psf_px)
+    along = arc_length(line.centreline)
+    width, sigma = (  # what lies on unknown pixels takes the width of its neighbours
+        np.interp(along, along[profiles.usable], values) for values in (known.width_px, known.sigma_px)
+    )
+    widths = Widths(width, sigma, known.is_upper_bound)
+    return MeasuredCrack(line.centreline, along, widths, line.network)

@@ -1,0 +1,92 @@
+"""What a photo says of its camera and its place: EXIF, and DJI's and Pix4D's XMP."""
+
+import math
+import re
+from dataclasses import dataclass
+
+from PIL import Image
+
+from schemas.contract import Vector3
+
+_EXIF_IFD, _GPS_IFD = 0x8769, 0x8825
+_FOCAL_MM, _FOCAL_35MM, _PLANE_X_RESOLUTION, _PLANE_UNIT = 0x920A, 0xA405, 0xA20E, 0xA210
+_MM_PER_UNIT = {2: 25.4, 3: 10.0, 4: 1.0}
+
+
+@dataclass(frozen=True)
+class Metadata:
+    focal_mm: float | None
+    focal_35mm: float | None  # 35-mm equivalent
+    px_per_mm: float | None  # on the sensor, of the image as stored
+    calibrated_focal_px: float | None  # DJI's own calibration
+    gps: Vector3 | None  # latitude, longitude (degrees), altitude above take-off (m; 0: not known)
+    view_deg: Vector3 | None  # yaw, pitch, roll of the gimbal
+
+
+def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
+    """Never raises: what is absent, garbled or out of range is None."""
+    camera = _ifd(exif, _EXIF_IFD)
+    unit = _MM_PER_UNIT.get(int(_number(camera.get(_PLANE_UNIT)) or 2))
+    resolution = _positive(camera.get(_PLANE_X_RESOLUTION))
+    angles = [_xmp(xmp, f"Gimbal{axis}Degree") for axis in ("Yaw", "Pitch", "Roll")]
+    yaw, pitch, roll = angles
+    return Metadata(
+        focal_mm=_positive(camera.get(_FOCAL_MM)),
+        focal_35mm=_positive(camera.get(_FOCAL_35MM)),
+        px_per_mm=resolution / unit if resolution and unit else None,
+        calibrated_focal_px=_positive(_xmp(xmp, "CalibratedFocalLength")),
+        gps=_gps(_ifd(exif, _GPS_IFD), _xmp(xmp, "RelativeAltitude")),
+        view_deg=None if yaw is None or pitch is None else _view(yaw, pitch, roll or 0.0),
+    )
+
+
+def _view(yaw: float, pitch: float, roll: float) -> Vector3 | None:
+    if abs(pitch) > 135 or abs(yaw) > 360 or abs(roll) > 360:
+        return None
+    if abs(roll) > 90:  # DJI writes a gimbal looking down past −90° as rolled by 180°
+        return yaw + 180.0, -180.0 - pitch if pitch < 0 else 180.0 - pitch, roll - math.copysign(180.0, roll)
+    return yaw, pitch, roll
+
+
+def _ifd(exif: Image.Exif, tag: int) -> dict[int, object]:
+    try:
+        return dict(exif.get_ifd(tag))
+    except Exception:  # Pillow raises whatever a garbled block leads it into
+        return {}
+
+
+def _number(value: object) -> float | None:
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, ZeroDivisionError):
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _positive(value: object) -> float | None:
+    number = _number(value)
+    return number if number is not None and number > 0 else None
+
+
+def _xmp(xmp: bytes, name: str) -> float | None:
+    found = re.search(name.encode() + rb"\s*(?:=\s*\"|>)\s*([+-]?[0-9.]+)", xmp)
+    return _number(found.group(1).decode()) if found else None
+
+
+def _gps(block: dict[int, object], relative_altitude_m: float | None) -> Vector3 | None:
+    latitude = _degrees(block.get(2), block.get(1), "S", 90.0)
+    longitude = _degrees(block.get(4), block.get(3), "W", 180.0)
+    if latitude is None or longitude is None or (latitude == 0.0 and longitude == 0.0):
+        return None  # receivers without a fix write zeros
+    return latitude, longitude, relative_altitude_m or 0.0
+
+
+def _degrees(parts: object, hemisphere: object, negative: str, largest: float) -> float | None:
+    if not isinstance(parts, tuple) or not parts:
+        return None
+    numbers = [_number(part) for part in parts[:3]]
+    if any(n is None for n in numbers):
+        return None
+    value = sum((n or 0.0) / 60**i for i, n in enumerate(numbers))
+    letter = hemisphere.decode("ascii", "ignore") if isinstance(hemisphere, bytes) else str(hemisphere or "")
+    return None if value > largest else -value if letter.strip("\x00 ").upper() == negative else value

@@ -1,0 +1,90 @@
+"""Decode a photo of any common kind into 8-bit upright RGB, or say by name why it cannot be."""
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+from schemas.problem import BadInput
+
+Pixels = npt.NDArray[np.uint8]
+
+FORMATS = ("JPEG", "PNG", "TIFF")
+SMALLEST_PX = 32  # per side; less is an icon, not a photo
+LARGEST_PX = 32_000  # per side; OpenCV's remap fails from 32,767
+REMEDY = "Give a JPEG, PNG or TIFF photo, or take this file out of the folder"
+
+Image.MAX_IMAGE_PIXELS = 600_000_000  # Pillow's own limit refuses cameras of more than 179 MP
+
+
+# What Pillow raises over damaged bytes, as it happens to trip; warnings where these are made errors.
+_DAMAGE = (OSError, ValueError, SyntaxError, struct.error, LookupError, TypeError, ArithmeticError, Warning)
+
+
+@dataclass(frozen=True)
+class Decoded:
+    pixels: Pixels  # (H, W, 3) RGB, upright
+    orientation: int  # EXIF orientation that has been undone
+    as_it_came: bool  # a plain reader gets these very pixels from the file itself
+    exif: Image.Exif
+    xmp: bytes
+
+
+def read_photo(path: Path, name: str) -> Decoded:
+    """Raises BadInput: not an image, truncated, too small, too large, or of no photographic kind."""
+    if path.stat().st_size == 0:
+        raise BadInput(name, "the file is empty (0 bytes)", REMEDY)
+    try:
+        with Image.open(path, formats=FORMATS) as image:
+            _check_size(image, name)
+            exif = image.getexif()
+            xmp = image.info.get("xmp", b"")
+            image.load()
+            orientation = _orientation(exif)
+            pixels = _rgb(_upright(image, orientation), name)
+            # MPO: a JPEG with a second picture inside, as DJI writes
+            known = image.format in ("JPEG", "MPO", "PNG") and image.mode in ("RGB", "L")
+            plain = known and orientation == 1
+    except BadInput:
+        raise
+    except UnidentifiedImageError:
+        raise BadInput(name, "is not an image that can be read", REMEDY) from None
+    except Image.DecompressionBombError:
+        raise BadInput(name, "has more pixels than a photo can have", REMEDY) from None
+    except _DAMAGE as error:
+        raise BadInput(name, f"is damaged ({error})", "Copy it again from the camera's card") from None
+    return Decoded(pixels, orientation, plain, exif, xmp if isinstance(xmp, bytes) else xmp.encode())
+
+
+def _check_size(image: Image.Image, name: str) -> None:
+    width, height = image.size
+    if min(width, height) < SMALLEST_PX or max(width, height) > LARGEST_PX:
+        raise BadInput(
+            name,
+            f"is {width} × {height} px; a photo has {SMALLEST_PX} to {LARGEST_PX} px a side",
+            REMEDY,
+        )
+
+
+def _orientation(exif: Image.Exif) -> int:
+    value = exif.get(0x0112, 1)
+    return value if value in range(1, 9) else 1
+
+
+def _upright(image: Image.Image, orientation: int) -> Image.Image:
+    return image if orientation == 1 else ImageOps.exif_transpose(image)
+
+
+def _rgb(image: Image.Image, name: str) -> Pixels:
+    """16-bit is scaled by 257, CMYK and palette converted, alpha dropped (a photo shows what it covers)."""
+    if image.mode.startswith("I") or image.mode == "F":
+        values = np.asarray(image, dtype=np.float64)
+        if not np.isfinite(values).all() or values.min() < 0 or values.max() > 65535:
+            raise BadInput(name, "has floating-point or 32-bit values that are no photo", REMEDY)
+        white = 1.0 if image.mode == "F" and values.max() <= 1 else 255.0 if values.max() <= 255 else 65535.0
+        grey = np.rint(values * (255.0 / white)).astype(np.uint8)
+        return np.repeat(grey[..., None], 3, axis=2)
+    return np.asarray(image.convert("RGB"))

@@ -1,0 +1,80 @@
+"""Stages: check and understand each photo; find its features."""
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from artifacts import store
+from schemas.assigned_shot import AssignedShot
+from schemas.camera import Camera, CameraPose
+from schemas.file import File
+from schemas.flight_log import FlightLog
+from schemas.photo import Features, Photo
+from schemas.problem import BadInput
+from schemas.settings import StitchSettings
+from tasks.photos.assignment import assign_shots
+from tasks.photos.intrinsics import camera_from_metadata, camera_of_photo
+from tasks.photos.metadata import read_metadata
+from tasks.photos.quality import exposure, sharpness
+from tasks.photos.reading import REMEDY, read_photo
+from tasks.photos.sift import detect_features, write_features
+from tasks.stage import stage
+
+
+@stage()
+def ingest(
+    file: File,
+    name: str,
+    surface: str,
+    camera: Camera | None,
+    pose: CameraPose | None,
+    position_sigma_m: float,
+) -> Photo:
+    """Decode, set upright, measure; camera from EXIF where none is given. Raises BadInput by name."""
+    decoded = read_photo(store.current().path(file), name)
+    height_px, width_px = decoded.pixels.shape[:2]
+    metadata = read_metadata(decoded.exif, decoded.xmp)
+    if camera is None:
+        camera, camera_from, focal_sigma = camera_from_metadata(width_px, height_px, metadata)
+    else:
+        camera = camera_of_photo(camera, width_px, height_px, decoded.orientation, name)
+        camera_from, focal_sigma = "inspection", 0.01
+    if not decoded.as_it_came:
+        with store.current().scratch() as folder:
+            Image.fromarray(decoded.pixels).save(folder / "upright.png", compress_level=3)
+            file = store.current().put(folder / "upright.png")
+    return Photo(
+        name=name,
+        file=file,
+        camera=camera,
+        camera_from=camera_from,
+        focal_sigma=focal_sigma,
+        pose=pose,
+        position_sigma_m=position_sigma_m,
+        gps=metadata.gps,
+        view_deg=metadata.view_deg,
+        surface=surface,
+        sharpness=sharpness(decoded.pixels),
+        exposure=exposure(decoded.pixels),
+        orientation=decoded.orientation,
+    )
+
+
+@stage()
+def assign(names: tuple[str, ...], log: FlightLog) -> tuple[AssignedShot, ...]:
+    """Which photo of a folder is which shot of the flight log."""
+    return assign_shots(names, log)
+
+
+@stage()
+def features(photo: Photo, settings: StitchSettings) -> Features:
+    """At most `settings.features` RootSIFT features."""
+    path = store.current().path(photo.file)
+    grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+    if grey is None:
+        raise BadInput(photo.name, "cannot be read", REMEDY)
+    keypoints = detect_features(np.asarray(grey, np.uint8), photo.camera, settings.features)
+    with store.current().scratch() as folder:
+        write_features(keypoints, folder / "features.npz")
+        entered = store.current().put(folder / "features.npz")
+    return Features(photo=photo.name, file=entered, count=len(keypoints.xy))

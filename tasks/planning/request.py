@@ -1,0 +1,78 @@
+"""What is asked of a plan, refused where it cannot be: surfaces, ground sample distance."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from schemas.camera import Camera
+from schemas.problem import BadInput
+from schemas.structure import Structure
+from schemas.surface import Surface
+from schemas.vehicle import Vehicle
+
+ROOM_M = 0.02  # a path cannot touch the inflation everywhere: roughness of the scanned surface
+
+
+def chosen_surfaces(structure: Structure, names: Sequence[str] | None) -> tuple[Surface, ...]:
+    """The surfaces to inspect: those named, else all but the ground."""
+    known = {s.name: s for s in structure.surfaces}
+    if not known:
+        raise BadInput(
+            "surfaces", "the structure has no surface", "Check the scans, or lower surfaces.min_area_m2."
+        )
+    if names is None:
+        chosen = tuple(s for name, s in known.items() if not name.startswith("ground-"))
+        if not chosen:
+            raise BadInput(
+                "plan.surfaces", "only ground was found", f"To inspect it, name it: {', '.join(known)}."
+            )
+        return chosen
+    unknown = [name for name in names if name not in known]
+    if unknown or not names:
+        raise BadInput(
+            "plan.surfaces",
+            f"there is no surface {', '.join(unknown)}" if unknown else "the list of surfaces is empty",
+            f"The structure has: {', '.join(known)}.",
+        )
+    return tuple(known[name] for name in dict.fromkeys(names))
+
+
+def check_camera(camera: Camera) -> None:
+    """Refuse a distortion that folds the image onto itself before its corners: no ray belongs to them."""
+    right, bottom = camera.width_px - 1.0, camera.height_px - 1.0
+    corners = (
+        np.array([(0, 0), (right, 0), (0, bottom), (right, bottom)]) - camera.principal_px
+    ) / camera.focal_px
+    with np.errstate(all="ignore"):
+        back = camera.distort(camera.undistort(corners))
+        unfolded = bool(np.all(np.abs(back - corners) * camera.focal_px < 0.5))
+    if not unfolded:
+        raise BadInput(
+            "camera",
+            "no ray leads to the corners of its image: its distortion (k1, k2, p1, p2, k3) cannot be right",
+            "Calibrate it again, or leave the distortion out.",
+        )
+
+
+def check_stand_off(gsd_mm_px: float, camera: Camera, vehicle: Vehicle) -> None:
+    """Refuse a ground sample distance whose stand-off leaves no clearance or no usable footprint."""
+    stand_off = camera.stand_off_m(gsd_mm_px)
+    if stand_off < vehicle.inflation_m + ROOM_M:
+        safe = np.ceil(camera.gsd_mm_px(vehicle.inflation_m + ROOM_M) * 1000) / 1000
+        longer = np.ceil((vehicle.inflation_m + ROOM_M) * 1000 / gsd_mm_px)
+        raise BadInput(
+            "plan.gsd_mm_px",
+            f"{gsd_mm_px:g} mm/px puts this camera {stand_off:.2f} m from the surface, but the vehicle must"
+            f" stay {vehicle.inflation_m:.2f} m away (radius {vehicle.radius_m:g}, clearance"
+            f" {vehicle.clearance_m:g}, position error {vehicle.position_error_m:.2f})",
+            f"Ask for {safe:g} mm/px or coarser, take a lens of at least {longer:.0f} px focal length, or"
+            " lower the clearance or the position error (RTK).",
+        )
+    footprint = min(camera.footprint_m(stand_off))
+    if footprint < 3 * vehicle.position_jitter_m:
+        raise BadInput(
+            "vehicle.position_jitter_m",
+            f"a photo covers {footprint:.2f} m, less than three times the jitter of"
+            f" {vehicle.position_jitter_m:g} m: neighbours would miss each other",
+            "Ask for a coarser plan.gsd_mm_px, take a camera with more pixels, or position by RTK.",
+        )

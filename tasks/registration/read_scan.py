@@ -1,0 +1,146 @@
+"""One scan of a file of any known format, checked, in metres."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import numpy.typing as npt
+
+from schemas.problem import BadInput
+from tasks.registration.readers import e57, las, pcd, ply, pts, ptx, xyz
+from tasks.registration.readers.file_scan import FileScan, Unreadable
+
+Array = npt.NDArray[np.float64]
+
+READERS: dict[str, ModuleType] = {
+    ".ply": ply, ".pcd": pcd, ".xyz": xyz, ".txt": xyz, ".asc": xyz, ".csv": xyz, ".pts": pts, ".ptx": ptx,
+    ".e57": e57, ".las": las, ".laz": las,
+}  # fmt: skip
+SMALLEST_M, LARGEST_M = 0.2, 10_000.0  # extent of what a terrestrial scanner sees of a structure
+FARTHEST_M = 1e8  # no coordinate system on Earth goes so far
+LARGE_COORDINATE_M = 1000.0  # beyond it float32 is coarser than 0.06 mm: shift to a local origin
+UNITS_M = {
+    "kilometres": 1000.0, "metres": 1.0, "feet": 0.3048, "inches": 0.0254, "centimetres": 0.01,
+    "millimetres": 0.001,
+}  # fmt: skip
+TYPICAL_EXTENT_M = 60.0
+
+
+@dataclass(frozen=True)
+class LoadedScan:
+    """A scan in metres. Its file's coordinates are `points_m + origin_m`."""
+
+    points_m: Array  # (N, 3) float64, finite
+    normals: Array | None  # (N, 3) unit, as the file has them
+    T_world_scan: Array | None  # (4, 4), maps points_m to the file's world, where the file states a pose
+    viewpoint_m: Array | None  # (3,) scanner in the frame of points_m; None: not known
+    origin_m: Array  # (3,) taken off large coordinates (UTM); zeros for others
+
+
+def scan_count(path: Path, name: str | None = None) -> int:
+    """How many scans the file holds, at least one. BadInput where it cannot be read."""
+    name = name or path.name
+    with _BadInputOf(name):
+        scans = int(_reader(path, name).count(path))
+    if scans == 0:
+        raise BadInput(name, "it holds no scan", "Export the scan again and check that it has points.")
+    return scans
+
+
+def stated_unit_m(path: Path, name: str | None = None) -> float | None:
+    """Metres per unit where the file itself says so (coordinate system of LAS and LAZ)."""
+    if path.suffix.lower() not in (".las", ".laz"):
+        return None
+    with _BadInputOf(name or path.name):
+        return las.stated_unit_m(path)
+
+
+def read_scan(path: Path, index: int = 0, unit_m: float = 1.0, name: str | None = None) -> LoadedScan:
+    """Read scan number `index` (from 0). Points that are NaN, infinite or off the Earth are dropped.
+
+    Coordinates beyond 1 km (UTM) lose a rounded origin, so that float32 keeps them exact later on.
+    Raises BadInput under `name` for a file that cannot be read, is cut short, holds no finite point, or
+    whose extent no structure has: 40 km or 40 mm say that the unit is not the stated one.
+    """
+    name = name or path.name
+    with _BadInputOf(name), np.errstate(all="ignore"):  # damaged bytes make odd floats
+        scan: FileScan = _reader(path, name).read(path, index)
+    if len(scan.points) == 0:
+        raise BadInput(name, "it holds no points", "Export the scan again and check that it has points.")
+    finite = np.asarray((np.abs(scan.points) < FARTHEST_M / unit_m).all(axis=1))  # NaN is not either
+    if not finite.any():
+        raise BadInput(name, "none of its points is finite (NaN)", "Export the scan again.")
+    points_m = scan.points[finite] * unit_m
+    _check_extent(points_m, unit_m, name)
+    middle_m = np.median(points_m, axis=0)
+    origin_m = np.where(np.abs(middle_m) > LARGE_COORDINATE_M, np.round(middle_m, -2), 0.0)
+    T_world_scan = None
+    if scan.T_world_scan is not None:
+        T_world_scan = scan.T_world_scan.copy()
+        T_world_scan[:3, 3] = T_world_scan[:3, 3] * unit_m + T_world_scan[:3, :3] @ origin_m
+    viewpoint_m = None
+    if scan.viewpoint is not None and scan.viewpoint.any():
+        viewpoint_m = scan.viewpoint * unit_m - origin_m
+    elif not origin_m.any():
+        viewpoint_m = np.zeros(3)  # a scanner's own frame starts at the scanner
+    return LoadedScan(
+        points_m - origin_m, _unit_normals(scan.normals, finite), T_world_scan, viewpoint_m, origin_m
+    )
+
+
+def _reader(path: Path, name: str) -> ModuleType:
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise BadInput(
+            name, f"scans of kind {path.suffix or '(no suffix)'!r} are not known",
+            f"Use one of {', '.join(sorted(READERS))}.",
+        )  # fmt: skip
+    return reader
+
+
+class _BadInputOf:
+    """Turns whatever a reader or its library raises about damaged bytes into one BadInput."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, _: object) -> None:
+        if isinstance(error, Exception) and not isinstance(error, BadInput):
+            what = str(error) if isinstance(error, Unreadable) else f"its bytes make no sense ({error})"
+            if isinstance(error, UnicodeDecodeError):
+                what = "it is no text file, though its name says so"
+            raise BadInput(self.name, what, "Export the scan again, or leave the file out.") from error
+
+
+def _check_extent(points_m: Array, unit_m: float, name: str) -> None:
+    low_m, high_m = np.percentile(points_m, [1, 99], axis=0) if len(points_m) >= 1000 else (
+        points_m.min(axis=0), points_m.max(axis=0),
+    )  # fmt: skip
+    extent_m = float(np.linalg.norm(high_m - low_m))
+    if extent_m == 0.0 or SMALLEST_M <= extent_m <= LARGEST_M:
+        return
+    in_file = extent_m / unit_m
+    likely, likely_m = min(
+        UNITS_M.items(), key=lambda unit: abs(np.log(in_file * unit[1] / TYPICAL_EXTENT_M))
+    )
+    size = f"{extent_m / 1000:.3g} km" if extent_m > LARGEST_M else f"{extent_m * 1000:.3g} mm"
+    raise BadInput(
+        name,
+        f"taken in units of {unit_m:g} m it is {size} large, which no scanned structure is",
+        f"Its unit is likely {likely}: state unit_m {likely_m:g}.",
+    )
+
+
+def _unit_normals(normals: Array | None, finite: npt.NDArray[np.bool_]) -> Array | None:
+    if normals is None:
+        return None
+    kept = normals[finite]
+    length = np.linalg.norm(kept, axis=1, keepdims=True)
+    usable = np.isfinite(length) & (length > 1e-6)
+    if usable.mean() < 0.99:  # columns of zeros, as some programs write them
+        return None
+    return np.asarray(np.where(usable, kept / np.where(usable, length, 1.0), 0.0))

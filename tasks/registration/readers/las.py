@@ -1,0 +1,93 @@
+"""LAS and LAZ: integer coordinates with scale and offset, read as float64."""
+
+import re
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+from tasks.registration.readers.file_scan import FileScan, Unreadable
+
+UNIT_OF_GEOKEY_M = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}  # EPSG: metre, foot, US survey foot
+LINEAR_UNITS_KEY = 3076  # GeoTIFF ProjLinearUnitsGeoKey
+MOST_PACKED = 1000  # times; real points pack to a tenth
+
+
+def count(path: Path) -> int:
+    return 1
+
+
+def read(path: Path, index: int) -> FileScan:
+    with _opened(path) as las:
+        announced = las.header.point_count
+        points = las.read()
+        found = np.column_stack([points.x, points.y, points.z]).astype(np.float64)
+    if len(found) < announced:
+        raise Unreadable(f"it is cut short: {announced} points are announced and {len(found)} follow")
+    return FileScan(found)
+
+
+def stated_unit_m(path: Path) -> float | None:
+    """Metres per unit as the file's coordinate system states it; None where it states none that we know."""
+    with _opened(path) as las:
+        records = las.header.vlrs
+    for record in records:
+        text = getattr(record, "string", "")
+        projected = text[text.find("PROJCS") :].split("VERT_CS")[0] if "PROJCS" in text else ""
+        if units := re.findall(r'UNIT\["[^"]*",\s*([0-9.eE+-]+)', projected):
+            return float(units[-1])  # the angular unit of its GEOGCS stands before the linear one
+        for key in getattr(record, "geo_keys", ()):
+            if key.id == LINEAR_UNITS_KEY and key.value_offset in UNIT_OF_GEOKEY_M:
+                return UNIT_OF_GEOKEY_M[key.value_offset]
+    return None
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[laspy.LasReader]:
+    _check_sizes(path)
+    try:
+        with laspy.open(path) as las:
+            yield las
+    except (KeyboardInterrupt, SystemExit, Unreadable):
+        raise
+    except BaseException as error:  # the LAZ decoder panics with a BaseException of its own
+        raise Unreadable(f"laspy refuses it: {str(error).strip() or type(error).__name__}") from error
+
+
+def _check_sizes(path: Path) -> None:
+    """Hold the header's numbers against the file's size before anything is read by them: laspy would loop
+    over billions of records, and the LAZ decoder ends the whole process where memory is short."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        head = stream.read(375)
+        if len(head) < 227 or head[:4] != b"LASF":
+            raise Unreadable("it has no LAS header")
+        data_at, records, kind, bytes_each, points = struct.unpack_from("<IIBHI", head, 96)
+        if head[25] >= 4 and len(head) >= 255:  # version 1.4
+            extended, points = struct.unpack_from("<IQ", head, 243)
+            records += extended
+        packed = bool(kind & 0x80)
+        if data_at > size or records * 54 > size:
+            raise Unreadable("its LAS header is damaged")
+        if points * bytes_each > (size - data_at) * (MOST_PACKED if packed else 1):
+            raise Unreadable(f"it is cut short: {points} points do not fit into its {size} bytes")
+        if packed and points:
+            _check_chunks(path, data_at, size)
+
+
+def _check_chunks(path: Path, data_at: int, size: int) -> None:
+    with path.open("rb") as stream:
+        stream.seek(data_at)
+        (table_at,) = struct.unpack("<q", stream.read(8))
+        if table_at == -1:  # written to a stream: the place of the table stands at the end
+            stream.seek(-8, 2)
+            (table_at,) = struct.unpack("<q", stream.read(8))
+        if not 0 < table_at <= size - 8:
+            raise Unreadable("the chunk table of its LAZ points is damaged")
+        stream.seek(table_at)
+        _, chunks = struct.unpack("<II", stream.read(8))
+        if chunks > size:
+            raise Unreadable("the chunk table of its LAZ points is damaged")

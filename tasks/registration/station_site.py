@@ -1,0 +1,79 @@
+"""A station as registration sees it: its clouds, what its scanner saw, and what the crew knew of its pose."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from schemas.problem import BadInput
+from schemas.scan import Scan
+from tasks.registration import visibility
+from tasks.registration.feature_match import Features, shape_features
+from tasks.registration.read_scan import LoadedScan
+from tasks.registration.rigid_motion import Array, inverse, pose, transform
+from tasks.registration.station_cloud import Cloud, coarse_cloud, fine_cloud
+
+LEAST_POINTS = 100  # fewer, at equal density, are no scan of a structure
+FEATURE_RADII = 5  # coarse voxels
+
+
+@dataclass(frozen=True)
+class Site:
+    """Frames: `scan` is the file's (metres), `local` the file's minus `shift_m` (kept small)."""
+
+    name: str
+    fine: Cloud  # local frame
+    scanner_m: Array | None  # (3,) local
+    shift_m: Array  # (3,) local + shift = scan
+    prior_T_world_local: Array | None  # as stated by the crew or the file; to be verified
+    position_m: Array | None  # (3,) measured scanner position in the world
+    points: int
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A site at coarse resolution."""
+
+    cloud: Cloud
+    voxel_m: float
+    middle: Cloud  # at a quarter of the coarse voxel, what fine alignment works on
+    image: visibility.RangeImage | None
+
+    @cached_property
+    def features(self) -> Features:
+        """Only stations without a usable position need them."""
+        return shape_features(self.cloud, FEATURE_RADII * self.voxel_m)
+
+
+def site(scan: Scan, loaded: LoadedScan, voxel_m: float) -> Site:
+    """Raises BadInput where nothing can be registered by so few points."""
+    fine = fine_cloud(loaded, voxel_m)
+    if len(fine) < LEAST_POINTS:
+        raise BadInput(
+            scan.name,
+            f"{len(fine)} points at {voxel_m * 1000:g} mm spacing are too few to register",
+            "Scan again, or leave the file out.",
+        )
+    prior = None
+    if scan.T_world_scan is not None:  # the crew's word goes before the file's
+        prior = np.array(scan.T_world_scan) @ pose(np.eye(3), loaded.origin_m)
+    elif loaded.T_world_scan is not None:
+        prior = loaded.T_world_scan
+    scanner_m = loaded.viewpoint_m
+    position_m = None
+    if scan.station_position_m is not None:
+        position_m = np.array(scan.station_position_m)
+        if prior is not None and loaded.origin_m.any():  # the cloud stands in the world, its scanner too
+            scanner_m = transform(inverse(prior), position_m[None])[0]
+    elif prior is not None and scanner_m is not None:
+        position_m = transform(prior, scanner_m[None])[0]
+    return Site(scan.name, fine, scanner_m, loaded.origin_m, prior, position_m, len(loaded.points_m))
+
+
+def shape(site: Site, voxel_m: float) -> Shape:
+    return Shape(
+        coarse_cloud(site.fine, voxel_m),
+        voxel_m,
+        coarse_cloud(site.fine, voxel_m / 4),
+        visibility.range_image(site.fine, site.scanner_m),
+    )

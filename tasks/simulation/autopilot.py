@@ -1,0 +1,339 @@
+"""The MAVLink side of the simulated vehicle: mission protocol, commands and telemetry as ArduCopter has them.
+
+On the ground it lives in real time. Once a mission starts its time is virtual: the whole flight is computed
+from mission and seed and told as fast as the link takes it, every message with the vehicle's own time.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from schemas.contract import Vector3
+from schemas.geodesy import GeoOrigin
+from schemas.mission import MissionItem
+from schemas.vehicle import Vehicle
+from tasks.simulation.trajectory import DO, NAVIGATION, STEP_S, Flown, fly_mission
+
+SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
+STABILIZE, AUTO, GUIDED = 0, 3, 4  # ArduCopter's modes
+CAPACITY = 700  # mission items
+BANNER = "ArduCopter simulated by Hairline"
+TELEMETRY_S = 0.1
+BOOT_MS = 30_000  # vehicle's clock when it arms
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What can go wrong, each with a switch."""
+
+    loss: float = 0.0  # share of frames lost in either direction
+    silent: bool = False  # takes the connection and says nothing
+    refuse_arm: bool = False
+    lose_last_item: bool = False  # of an uploaded mission
+    vanish_s: float | None = None  # the link ends at this time of the flight
+
+
+class Vanished(Exception):
+    """The fault `vanish_s`: hang up."""
+
+
+class Autopilot:
+    """send: takes the bytes of one frame."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        origin: GeoOrigin,
+        home_m: Vector3,
+        seed: int,
+        faults: Faults,
+        send: Callable[[bytes], None],
+    ) -> None:
+        self.vehicle, self.origin, self.home_m, self.seed, self.faults = vehicle, origin, home_m, seed, faults
+        self.mav = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
+        self.mav.robust_parsing = True
+        self._send_bytes = send
+        self._loss = np.random.default_rng([seed, 0x6C6F7373])
+        self.mission: list[MissionItem] = []
+        self.incoming: list[MissionItem] = []
+        self.expected = 0  # items of the upload in progress; 0: none
+        self.armed, self.mode = False, STABILIZE
+
+    # -- link ------------------------------------------------------------------------------------------
+
+    def receive(self, data: bytes) -> None:
+        for message in self.mav.parse_buffer(data) or []:
+            if message.get_type() == "BAD_DATA" or self._lost():
+                continue
+            handler = getattr(self, f"_on_{message.get_type().lower()}", None)
+            if handler is not None and getattr(message, "target_system", SYSTEM) == SYSTEM:
+                handler(message)
+
+    def send(self, message: Any) -> None:
+        frame = message.pack(self.mav)
+        self.mav.seq = (self.mav.seq + 1) % 256
+        if not self._lost():
+            self._send_bytes(frame)
+
+    def _lost(self) -> bool:
+        return self.faults.silent or (self.faults.loss > 0 and float(self._loss.random()) < self.faults.loss)
+
+    def heartbeat(self) -> None:
+        mode = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        if self.armed:
+            mode |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+        state = mavlink.MAV_STATE_ACTIVE if self.armed else mavlink.MAV_STATE_STANDBY
+        self.send(
+            self.mav.heartbeat_encode(
+                mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mode, self.mode, state
+            )
+        )
+
+    def on_ground(self) -> None:
+        """What it tells every second while it waits; it also asks again for a mission item."""
+        self.heartbeat()
+        if self.expected:
+            self._ask()
+        self._position(0.0, self.home_m, 0.0, (0.0, 0.0, 0.0))
+
+    def _say(self, text: str, severity: int = mavlink.MAV_SEVERITY_INFO) -> None:
+        self.send(self.mav.statustext_encode(severity, text.encode()[:50]))
+
+    # -- mission protocol ------------------------------------------------------------------------------
+
+    def _on_mission_count(self, message: Any) -> None:
+        if message.count > CAPACITY:
+            self._mission_ack(mavlink.MAV_MISSION_NO_SPACE)
+            return
+        self.mission, self.incoming, self.expected = [], [], message.count
+        self._ask()
+
+    def _ask(self) -> None:
+        self.send(
+            self.mav.mission_request_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, len(self.incoming))
+        )
+
+    def _on_mission_item_int(self, message: Any) -> None:
+        if not self.expected:
+            self._mission_ack(mavlink.MAV_MISSION_ERROR)
+        elif message.seq != len(self.incoming):
+            self._mission_ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
+        else:
+            refusal = _refusal(message)
+            if refusal is not None:
+                self.expected = 0
+                self.mission = self.incoming  # as ArduPilot: what came so far stays
+                self._mission_ack(refusal)
+                return
+            self.incoming.append(_stored(message))
+            if len(self.incoming) < self.expected:
+                self._ask()
+            else:
+                self.expected = 0
+                self.mission = self.incoming[: -1 if self.faults.lose_last_item else None]
+                self._mission_ack(mavlink.MAV_MISSION_ACCEPTED)
+
+    def _on_mission_clear_all(self, message: Any) -> None:
+        self.mission, self.incoming, self.expected = [], [], 0
+        self._mission_ack(mavlink.MAV_MISSION_ACCEPTED)
+
+    def _on_mission_request_list(self, message: Any) -> None:
+        self.send(self.mav.mission_count_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, len(self.mission)))
+
+    def _on_mission_request_int(self, message: Any) -> None:
+        if message.seq >= len(self.mission):
+            self._mission_ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
+            return
+        item = self.mission[message.seq]
+        x, y, z = item.x, item.y, item.z
+        if item.seq == 0:
+            latitude, longitude, z = self.origin.to_geographic(self.home_m)
+            x, y = round(latitude * 1e7), round(longitude * 1e7)
+        params = (item.param1, item.param2, item.param3, item.param4)
+        self.send(
+            self.mav.mission_item_int_encode(
+                255,
+                mavlink.MAV_COMP_ID_MISSIONPLANNER,
+                item.seq,
+                item.frame,
+                item.command,
+                0,
+                1,
+                *params,
+                x,
+                y,
+                z,
+            )
+        )
+
+    def _mission_ack(self, result: int) -> None:
+        self.send(self.mav.mission_ack_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, result))
+
+    # -- commands --------------------------------------------------------------------------------------
+
+    def _on_command_long(self, message: Any) -> None:
+        accepted, denied = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
+        result = accepted
+        if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            result = self._arm() if message.param1 == 1.0 else self._disarm()
+        elif message.command == mavlink.MAV_CMD_DO_SET_MODE:
+            self.mode = int(message.param2)
+        elif message.command == mavlink.MAV_CMD_MISSION_START:
+            result = accepted if self.armed and len(self.mission) > 1 else denied
+        elif message.command == mavlink.MAV_CMD_DO_SEND_BANNER:
+            self._say(BANNER)
+        elif message.command != mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+            result = mavlink.MAV_RESULT_UNSUPPORTED
+        self.send(self.mav.command_ack_encode(message.command, result))
+        if message.command == mavlink.MAV_CMD_MISSION_START and result == accepted:
+            self.mode = AUTO
+            self._fly()
+
+    def _arm(self) -> int:
+        if self.faults.refuse_arm:
+            self._say("PreArm: Compass not calibrated", mavlink.MAV_SEVERITY_CRITICAL)
+            return int(mavlink.MAV_RESULT_FAILED)
+        if not self.armed:
+            self.armed = True
+            self.mav.seq = 0  # so that the flight's frames do not depend on what was said before
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _disarm(self) -> int:
+        self.armed = False
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    # -- flight ----------------------------------------------------------------------------------------
+
+    def _fly(self) -> None:
+        flown = fly_mission(tuple(self.mission), self.origin, self.home_m, self.vehicle, self.seed)
+        for time_s, tell in sorted(self._events(flown), key=lambda event: event[0]):  # stable
+            if self.faults.vanish_s is not None and time_s >= self.faults.vanish_s:
+                raise Vanished
+            tell()
+        self.armed = False
+        self.heartbeat()
+
+    def _events(self, flown: Flown) -> Iterator[tuple[float, Callable[[], None]]]:
+        """What it tells during the flight, each with its time, in no order."""
+        velocity = np.gradient(flown.estimated_m, STEP_S, axis=0)
+        every = round(TELEMETRY_S / STEP_S)
+        for step in range(0, len(flown.time_s), every):
+            time_s = float(flown.time_s[step])
+            if step % (every * 10) == 0:
+                yield time_s, self.heartbeat
+            yield time_s, self._tell_position(flown, velocity, step)
+        for seq, time_s in flown.reached:
+            yield time_s, self._tell_reached(seq)
+        for index, shot in enumerate(flown.shots):
+            pose = shot.estimated_pose
+            yield shot.time_s, self._tell_shot(shot.time_s, index, pose.position_m, pose.yaw_deg)
+
+    def _tell_position(self, flown: Flown, velocity: Any, step: int) -> Callable[[], None]:
+        def tell() -> None:
+            x, y, z = (float(v) for v in flown.estimated_m[step])
+            vx, vy, vz = (float(v) for v in velocity[step])
+            self._position(
+                float(flown.time_s[step]), (x, y, z), float(flown.estimated_yaw_deg[step]), (vx, vy, vz)
+            )
+
+        return tell
+
+    def _tell_reached(self, seq: int) -> Callable[[], None]:
+        def tell() -> None:
+            self.send(self.mav.mission_item_reached_encode(seq))
+            self.send(self.mav.mission_current_encode(min(seq + 1, len(self.mission) - 1)))
+
+        return tell
+
+    def _tell_shot(self, time_s: float, index: int, at_m: Vector3, yaw_deg: float) -> Callable[[], None]:
+        def tell() -> None:
+            latitude, longitude, altitude = self.origin.to_geographic(at_m)
+            self.send(
+                self.mav.camera_feedback_encode(
+                    time_usec=self._clock_ms(time_s) * 1000,
+                    target_system=SYSTEM,
+                    cam_idx=0,
+                    img_idx=index,
+                    lat=round(latitude * 1e7),
+                    lng=round(longitude * 1e7),
+                    alt_msl=altitude,
+                    alt_rel=at_m[2] - self.home_m[2],
+                    roll=0.0,
+                    pitch=0.0,
+                    yaw=yaw_deg,
+                    foc_len=0.0,
+                    flags=mavlink.CAMERA_FEEDBACK_PHOTO,
+                )
+            )
+
+        return tell
+
+    def _position(self, time_s: float, at_m: Vector3, yaw_deg: float, velocity_m_s: Vector3) -> None:
+        clock = self._clock_ms(time_s)
+        latitude, longitude, altitude = self.origin.to_geographic(at_m)
+        east, north, up = (at - home for at, home in zip(at_m, self.home_m, strict=True))
+        ve, vn, vu = velocity_m_s
+        heading = yaw_deg % 360.0
+        self.send(
+            self.mav.attitude_encode(clock, 0.0, 0.0, math.radians((heading + 180) % 360 - 180), 0, 0, 0)
+        )
+        self.send(self.mav.local_position_ned_encode(clock, north, east, -up, vn, ve, -vu))
+        self.send(
+            self.mav.global_position_int_encode(
+                clock,
+                round(latitude * 1e7),
+                round(longitude * 1e7),
+                round(altitude * 1000),
+                round(up * 1000),
+                round(vn * 100),
+                round(ve * 100),
+                round(-vu * 100),
+                round(heading * 100) % 36000,
+            )
+        )
+
+    @staticmethod
+    def _clock_ms(time_s: float) -> int:
+        return BOOT_MS + round(time_s * 1000)
+
+
+def _refusal(message: Any) -> int | None:
+    """Why ArduPilot would not take this item."""
+    if message.command not in NAVIGATION + DO:
+        return int(mavlink.MAV_MISSION_UNSUPPORTED)
+    if message.command in NAVIGATION:
+        if message.frame not in (
+            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+        ):
+            return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+        if abs(message.x) > 900_000_000:
+            return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
+    return None
+
+
+def _stored(message: Any) -> MissionItem:
+    """What ArduPilot keeps of an item: whole seconds of hold, centimetres, frame 3 or 0, no mount mode."""
+    navigates = message.command in NAVIGATION
+    mount = message.command == mavlink.MAV_CMD_DO_MOUNT_CONTROL
+    waypoint = message.command == mavlink.MAV_CMD_NAV_WAYPOINT
+    return MissionItem(
+        seq=message.seq,
+        frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT if navigates else mavlink.MAV_FRAME_GLOBAL,
+        command=message.command,
+        param1=float(int(message.param1)) if waypoint else _finite(message.param1),
+        param2=0.0 if waypoint else _finite(message.param2),
+        param3=_finite(message.param3),
+        param4=0.0 if waypoint else _finite(message.param4),
+        x=message.x,
+        y=message.y,
+        z=round(message.z, 2) if navigates else (0.0 if mount else message.z),
+    )
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else 0.0

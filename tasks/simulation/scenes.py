@@ -1,0 +1,46 @@
+"""The scenes by name, and the inspection that is ready for each."""
+
+from functools import lru_cache
+from threading import Lock
+from typing import Literal
+
+from schemas.inspection import CameraInput, Inspection, SimulationInput
+from schemas.settings import PlanSettings
+from schemas.vehicle import Vehicle
+from tasks.simulation import bridge, wall
+from tasks.simulation.scene import Scene
+
+BRIDGE_SURFACES = ("wall-south-08", "soffit-02", "wall-east-01")
+VEHICLE = Vehicle(radius_m=0.4, clearance_m=1.0, position_bias_m=0.1, position_jitter_m=0.03)  # RTK
+
+
+_building = Lock()  # photos of several surfaces are taken at a time, of one scene
+
+
+def build(simulation: SimulationInput) -> Scene:
+    """The scene of a simulation. Kept, since its textures take seconds to make."""
+    with _building:
+        return _built(simulation)
+
+
+@lru_cache(maxsize=1)
+def _built(simulation: SimulationInput) -> Scene:
+    return bridge.bridge(simulation.seed) if simulation.scene == "bridge" else wall.wall(simulation.seed)
+
+
+def ready_inspection(scene: Literal["bridge", "wall"]) -> Inspection:
+    """The inspection that the demo runs. The bridge's surfaces are named as the extraction names them: an
+    outer girder web, a soffit bay, a pier's face."""
+    simulation = SimulationInput(scene=scene)
+    if scene == "wall":
+        camera = CameraInput.model_validate(wall.CAMERA.model_dump())
+        return Inspection(name="demo-wall", simulation=simulation, camera=camera)
+    return Inspection(
+        name="demo",
+        simulation=simulation,
+        flight="simulated",
+        camera=CameraInput.model_validate(bridge.CAMERA.model_dump()),
+        vehicle=VEHICLE,
+        origin=bridge.ORIGIN,
+        plan=PlanSettings(gsd_mm_px=bridge.GSD_MM_PX, overlap=0.5, surfaces=BRIDGE_SURFACES),
+    )

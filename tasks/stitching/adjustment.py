@@ -1,0 +1,144 @@
+"""Bundle adjustment of plane-induced cameras: what makes a mosaic metric.
+
+Unknown: six numbers a photo (rotation, position), a focal length and k1 per camera, the positions' common
+error, two coordinates per track on the plane. Residuals are pixels of the photos as taken, through the full
+Brown model, so nothing is gained by shrinking the mosaic: what is left free is a similarity, which the
+priors hold. Levenberg-Marquardt with Cauchy weights; tracks are eliminated (Schur complement, Triggs et al.
+2000, section 6), photos remain as a banded system."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tasks.stitching.bundle import (
+    Bundle,
+    State,
+    build_bundle,
+    camera_key,
+    linearise,
+    nominal_k1,
+    points,
+    prior_errors,
+    residuals,
+    sigma_k1,
+)
+from tasks.stitching.normal_equations import damped_step
+from tasks.stitching.prior import Prior
+from tasks.stitching.tracks import Observations
+from tasks.stitching.view import Array, View
+
+# Each round adjusts, then drops outliers. Residuals are taken for at least this uncertain (px): wide weights
+# first, since narrow ones freeze whatever the first guess got wrong; SIFT is not better than the last.
+LEAST_SIGMA_PX = (2.0, 0.5, 0.1)
+ITERATIONS = 40
+CONVERGED = 1e-4  # relative fall of the cost
+ALIKE = 25.0  # so many points of a photo err alike (relief, shutter, lens): they count as one
+CAUCHY = 2.5  # residuals of this many sigma count half
+OUTLIER = 5.0  # and those of this many are dropped at the end
+FAR = 3.0  # positions off by so many sigma count half: some photo bears another's
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    views: tuple[View, ...]  # with adjusted cameras; as given where the photo was not observed
+    observations: Observations  # without outliers
+    residual_px: Array  # (M, 2)
+    sigma_px: float  # of one coordinate, robust
+    bias: Array  # (3,) common error of the prior positions
+
+
+def adjust(
+    views: Sequence[View],
+    observations: Observations,
+    priors: Sequence[Prior],
+    sigma_bias: Array,
+    focal_sigmas: Sequence[float],
+    on_progress: Callable[[float], None],
+) -> Adjusted:
+    """Cameras of all photos that are observed. `views` are first guesses."""
+    seen = np.unique(observations.photo)
+    index = np.full(len(views), -1)
+    index[seen] = np.arange(len(seen))
+    own, own_priors = [views[i] for i in seen], [priors[i] for i in seen]
+    current = replace(observations, photo=index[observations.photo])
+    cameras = tuple({camera_key(v.camera): v.camera for v in own}.values())
+    state = State(
+        R=np.stack([v.R for v in own]),
+        C=np.stack([v.C for v in own]),
+        log_focal=np.zeros(len(cameras)),
+        k1=np.array([c.k1 for c in cameras]),
+        bias=np.zeros(3),
+        X=np.zeros((0, 2)),
+    )
+    sigma, residual = 0.0, np.zeros((0, 2))
+    for round_, least_sigma in enumerate(LEAST_SIGMA_PX):
+        bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, [focal_sigmas[i] for i in seen])
+        state = replace(state, X=points(state, bundle))
+        state, residual, sigma = _iterate(state, bundle, least_sigma)
+        on_progress((round_ + 1) / len(LEAST_SIGMA_PX))
+        good = np.linalg.norm(residual, axis=1) < OUTLIER * sigma
+        if round_ < len(LEAST_SIGMA_PX) - 1:
+            current = current.where(good)
+    adjusted = list(views)
+    for k, i in enumerate(seen):
+        adjusted[i] = bundle.view(state, k)
+    return Adjusted(tuple(adjusted), replace(current, photo=seen[current.photo]), residual, sigma, state.bias)
+
+
+def _iterate(state: State, bundle: Bundle, least_sigma: float) -> tuple[State, Array, float]:
+    """To the minimum; residuals (M, 2) and their robust sigma there."""
+    damping = 1e-4
+    residual, jacobians = linearise(state, bundle)
+    for _ in range(ITERATIONS):
+        sigma = max(_sigma(residual), least_sigma)
+        cost = _cost(state, bundle, residual, sigma)
+        while True:
+            weight = 1.0 / (1.0 + _squares(residual, sigma)) / sigma**2 / ALIKE
+            trust = 1.0 / (1.0 + _far(state, bundle))
+            candidate = damped_step(state, bundle, residual, jacobians, weight, trust, damping)
+            new_residual = residuals(candidate, bundle)
+            new_cost = _cost(candidate, bundle, new_residual, sigma)
+            if new_cost <= cost or damping > 1e8:
+                break
+            damping *= 8.0
+        if not new_cost <= cost:
+            break
+        state, damping = candidate, max(damping / 3.0, 1e-9)
+        residual, jacobians = linearise(state, bundle)
+        if cost - new_cost < CONVERGED * cost:
+            break
+    return state, residual, max(_sigma(residual), least_sigma)
+
+
+def _sigma(residual: Array) -> float:
+    """Of one coordinate, from the median length (Rayleigh: 1.177 σ)."""
+    lengths = np.linalg.norm(np.nan_to_num(residual, nan=1e6), axis=1)
+    return float(np.median(lengths)) / 1.1774
+
+
+def _squares(residual: Array, sigma: float) -> Array:
+    """(M,) squared lengths in units of where they count half."""
+    return np.asarray((residual**2).sum(axis=1) / (CAUCHY * sigma) ** 2)
+
+
+def _far(state: State, bundle: Bundle) -> Array:
+    """(n,) squared distances from the prior positions in units of where they count half."""
+    _, moved = prior_errors(state, bundle)
+    return np.asarray((bundle.weight_position * moved**2).sum(axis=1) / FAR**2)
+
+
+def _cost(state: State, bundle: Bundle, residual: Array, sigma: float) -> float:
+    """Twice the negative logarithm of the likelihood, but for a constant."""
+    if not np.isfinite(residual).all():
+        return float("inf")
+    turned, _ = prior_errors(state, bundle)
+    terms = (
+        CAUCHY**2 / ALIKE * np.log1p(_squares(residual, sigma)).sum(),
+        FAR**2 * np.log1p(_far(state, bundle)).sum(),
+        (bundle.weight_rotation * turned**2).sum(),
+        (bundle.weight_bias * state.bias**2).sum(),
+        ((state.log_focal / bundle.sigma_log_focal) ** 2).sum(),
+        (((state.k1 - nominal_k1(bundle)) / sigma_k1(bundle)) ** 2).sum(),
+    )
+    return float(sum(terms))

@@ -1,0 +1,197 @@
+"""The bundle: cameras above a plane, points on it, where the photos show them, and what is known before.
+
+Residuals are pixels of the photos as taken, through the full Brown model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.camera import Camera
+from tasks.stitching.prior import Prior
+from tasks.stitching.tracks import Index, Observations
+from tasks.stitching.view import FACING, Array, View, rotation, rotation_vector, with_lens
+
+K1_AT_EDGE = 0.03  # 1σ of what k1 may move the photo's edge by, as a share of its radius
+HELD = 0.01  # 1σ, of its distance and in radians, of the photo that holds a bundle without positions
+
+
+@dataclass(frozen=True)
+class State:
+    R: Array  # (n, 3, 3)
+    C: Array  # (n, 3)
+    log_focal: Array  # (cameras,) relative to the nominal
+    k1: Array  # (cameras,)
+    bias: Array  # (3,)
+    X: Array  # (tracks, 2)
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """What does not change while iterating. n photos, M observations."""
+
+    photo: Index  # (M,)
+    track: Index  # (M,)
+    xy: Array  # (M, 2) pixels as taken
+    cameras: tuple[Camera, ...]  # distinct ones, nominal
+    camera_of: Index  # (n,)
+    sigma_log_focal: Array  # (cameras,)
+    prior_R: Array  # (n, 3, 3)
+    prior_C: Array  # (n, 3)
+    weight_rotation: Array  # (n, 3) 1/σ²; 0: not known
+    weight_position: Array  # (n, 3)
+    weight_bias: Array  # (3,)
+
+    @property
+    def shared(self) -> int:
+        return 2 * len(self.cameras) + 3
+
+    def view(self, state: State, k: int) -> View:
+        c = int(self.camera_of[k])
+        nominal = self.cameras[c]
+        focal = float(nominal.focal_px * np.exp(state.log_focal[c]))
+        return View(with_lens(nominal, focal, float(state.k1[c])), state.R[k], state.C[k])
+
+
+def build_bundle(
+    views: Sequence[View],
+    cameras: tuple[Camera, ...],
+    observations: Observations,
+    priors: Sequence[Prior],
+    sigma_bias: Array,
+    focal_sigmas: Sequence[float],
+) -> Bundle:
+    keys = [camera_key(camera) for camera in cameras]
+    camera_of = np.array([keys.index(camera_key(v.camera)) for v in views], np.int64)
+    xy = observations.xy.copy()
+    for k, view in enumerate(views):
+        if any(view.camera.distortion):
+            mine = observations.photo == k
+            principal = np.asarray(view.camera.principal_px)
+            ideal = (xy[mine] - principal) / view.camera.focal_px
+            xy[mine] = view.camera.distort(ideal) * view.camera.focal_px + principal
+    position = np.stack([p.sigma_position for p in priors])
+    rotations = np.stack([p.sigma_rotation for p in priors])
+    prior_C = np.stack([p.view.C for p in priors])
+    prior_R = np.stack([p.view.R for p in priors])
+    if not np.isfinite(position).any():  # no position known: one photo holds still, at its first guess
+        root = int(np.bincount(observations.photo).argmax())
+        prior_C[root], prior_R[root] = views[root].C, _upright(views[root].R)
+        position[root] = HELD * views[root].C[2]
+        rotations[root, 2] = HELD
+    return Bundle(
+        photo=observations.photo,
+        track=observations.track,
+        xy=xy,
+        cameras=cameras,
+        camera_of=camera_of,
+        sigma_log_focal=np.array([focal_sigmas[int(np.argmax(camera_of == c))] for c in range(len(cameras))]),
+        prior_R=prior_R,
+        prior_C=prior_C,
+        weight_rotation=np.where(np.isfinite(rotations), rotations, np.inf) ** -2.0,
+        weight_position=np.where(np.isfinite(position), position, np.inf) ** -2.0,
+        weight_bias=np.maximum(sigma_bias, 1e-9) ** -2.0,
+    )
+
+
+def camera_key(camera: Camera) -> tuple[object, ...]:
+    """Its fields alone: pydantic's own comparison trips over the matrices cached on the model."""
+    return tuple(camera.model_dump().values())
+
+
+def _upright(R: Array) -> Array:
+    """Facing the plane squarely, turned about w as R is."""
+    angle = np.arctan2(R[1, 0], R[0, 0])
+    return np.asarray(rotation(np.array([0.0, 0.0, angle])) @ FACING)
+
+
+def points(state: State, bundle: Bundle) -> Array:
+    """(T, 2) tracks where the present cameras see them, on average."""
+    total = np.zeros((int(bundle.track[-1]) + 1, 2))
+    for k in range(len(state.C)):
+        mine = bundle.photo == k
+        view = bundle.view(state, k)
+        principal, focal = np.asarray(view.camera.principal_px), view.camera.focal_px
+        ideal = view.camera.undistort((bundle.xy[mine] - principal) / focal)
+        np.add.at(total, bundle.track[mine], np.nan_to_num(view.to_plane(ideal * focal + principal)))
+    return np.asarray(total / np.bincount(bundle.track)[:, None])
+
+
+def prior_errors(state: State, bundle: Bundle) -> tuple[Array, Array]:
+    turned = rotation_vector(np.einsum("nji,njk->nik", bundle.prior_R, state.R))
+    return turned, state.C - bundle.prior_C - state.bias
+
+
+def nominal_k1(bundle: Bundle) -> Array:
+    return np.array([c.k1 for c in bundle.cameras])
+
+
+def sigma_k1(bundle: Bundle) -> Array:
+    radius = np.array([np.hypot(c.width_px, c.height_px) / 2 / c.focal_px for c in bundle.cameras])
+    return np.asarray(K1_AT_EDGE / radius**2)
+
+
+def _ideal(state: State, bundle: Bundle) -> tuple[Array, Array]:
+    """Ideal image coordinates (M, 2) and points in camera (M, 3)."""
+    R, C = state.R[bundle.photo], state.C[bundle.photo]
+    offset = np.column_stack([state.X, np.zeros(len(state.X))])[bundle.track] - C
+    in_camera = np.einsum("mji,mj->mi", R, offset)
+    z = np.where(in_camera[:, 2] > 1e-9, in_camera[:, 2], np.nan)
+    return in_camera[:, :2] / z[:, None], in_camera
+
+
+def residuals(state: State, bundle: Bundle) -> Array:
+    xy, _ = _ideal(state, bundle)
+    residual = np.empty_like(xy)
+    of = bundle.camera_of[bundle.photo]
+    for c, nominal in enumerate(bundle.cameras):
+        mine = of == c
+        camera = with_lens(nominal, float(nominal.focal_px * np.exp(state.log_focal[c])), float(state.k1[c]))
+        residual[mine] = camera.distort(xy[mine]) * camera.focal_px + camera.principal_px - bundle.xy[mine]
+    return residual
+
+
+@dataclass(frozen=True)
+class Jacobians:
+    pose: Array  # (M, 2, 6) by rotation (in the camera's frame, radians) and position
+    lens: Array  # (M, 2, 2) by log focal and k1
+    point: Array  # (M, 2, 2)
+
+
+def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
+    xy, p = _ideal(state, bundle)
+    x, y = xy.T
+    r2 = x * x + y * y
+    of = bundle.camera_of[bundle.photo]
+    k1 = state.k1[of]
+    k2, p1, p2, k3 = np.array([c.distortion[1:] for c in bundle.cameras])[of].T
+    focal = (np.array([c.focal_px for c in bundle.cameras]) * np.exp(state.log_focal))[of]
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))  # of radial by x, over x
+    distorted = np.stack(
+        [
+            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+        ],
+        axis=1,
+    )
+    cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
+    by_ideal = np.empty((len(x), 2, 2))
+    by_ideal[:, 0, 0] = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+    by_ideal[:, 0, 1] = by_ideal[:, 1, 0] = cross
+    by_ideal[:, 1, 1] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+    zero, inverse = np.zeros(len(x)), 1.0 / p[:, 2]
+    projection = np.stack([inverse, zero, -x * inverse, zero, inverse, -y * inverse], axis=1).reshape(
+        -1, 2, 3
+    )
+    by_camera = focal[:, None, None] * (by_ideal @ projection)
+    a, b, c = p.T
+    turning = np.stack([zero, -c, b, c, zero, -a, -b, a, zero], axis=1).reshape(-1, 3, 3)
+    R_transposed = np.swapaxes(state.R[bundle.photo], 1, 2)
+    moving = by_camera @ R_transposed
+    principal = np.array([cam.principal_px for cam in bundle.cameras])[of]
+    return focal[:, None] * distorted + principal - bundle.xy, Jacobians(
+        pose=np.concatenate([by_camera @ turning, -moving], axis=2),
+        lens=focal[:, None, None] * np.stack([distorted, xy * r2[:, None]], axis=2),
+        point=np.ascontiguousarray(moving[:, :, :2]),
+    )

@@ -1,0 +1,128 @@
+"""The mosaic's pixels, tile by tile: memory holds a few tiles and a few photos, never all."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from os import cpu_count
+from threading import Lock
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tasks.stitching.blending import ALIGN, REACH, MultiBand
+from tasks.stitching.canvas import Canvas
+from tasks.stitching.gain import gain_table
+from tasks.stitching.seams import label_window, photo_map
+from tasks.stitching.view import View, shrunk
+
+Pixels = npt.NDArray[np.uint8]
+
+TILE_PX = 1024
+CACHE_BYTES = 400_000_000  # of decoded photos kept for the next tile
+
+
+@dataclass(frozen=True)
+class Tile:
+    x: int
+    y: int
+    rgb: Pixels  # (h, w, 3)
+    coverage: Pixels  # (h, w) 255 where a photo covers the pixel
+    source: npt.NDArray[np.uint16]  # (h, w) 1 + index of the photo; 0: none
+
+
+class PhotoCache:
+    """Photos as RGB; the least lately used go first. Safe to share between threads."""
+
+    def __init__(self, read: Callable[[int], Pixels]) -> None:
+        self._read, self._kept, self._lock = read, OrderedDict[int, Pixels](), Lock()
+
+    def __call__(self, index: int) -> Pixels:
+        with self._lock:
+            if index in self._kept:
+                self._kept.move_to_end(index)
+                return self._kept[index]
+        pixels = self._read(index)
+        with self._lock:
+            self._kept[index] = pixels
+            while len(self._kept) > 1 and sum(p.nbytes for p in self._kept.values()) > CACHE_BYTES:
+                self._kept.popitem(last=False)
+        return pixels
+
+
+def composite(
+    canvas: Canvas,
+    views: Sequence[View],
+    worth: Sequence[float],
+    gains: npt.NDArray[np.float64],
+    read: Callable[[int], Pixels],
+    on_progress: Callable[[float], None],
+) -> Iterator[Tile]:
+    """Tiles of TILE_PX, row by row, boustrophedon. `read(i)` gives the photo of views[i] as RGB."""
+    shrink = [max(1, int(canvas.gsd / v.units_per_px + 0.25)) for v in views]
+    used = [shrunk(v, s) for v, s in zip(views, shrink, strict=True)]
+    tables = [gain_table(float(g)) for g in gains]
+
+    def read_used(index: int) -> Pixels:
+        pixels, camera = read(index), used[index].camera
+        if shrink[index] == 1:
+            return pixels
+        return np.asarray(
+            cv2.resize(pixels, (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA)
+        )
+
+    cache = PhotoCache(read_used)
+    corners = _corners(canvas)
+    workers = min(2, cpu_count() or 1)
+    with ThreadPoolExecutor(max_workers=workers) as threads:
+        for start in range(0, len(corners), workers):
+            batch = corners[start : start + workers]
+            yield from threads.map(lambda corner: _tile(corner, canvas, used, worth, tables, cache), batch)
+            on_progress(min(1.0, (start + workers) / len(corners)))
+
+
+def _corners(canvas: Canvas) -> list[tuple[int, int]]:
+    columns = list(range(0, canvas.width_px, TILE_PX))
+    rows = range(0, canvas.height_px, TILE_PX)
+    return [(x, y) for k, y in enumerate(rows) for x in (columns if k % 2 == 0 else columns[::-1])]
+
+
+def _tile(
+    corner: tuple[int, int],
+    canvas: Canvas,
+    views: Sequence[View],
+    worth: Sequence[float],
+    tables: Sequence[npt.NDArray[np.float32]],
+    read: Callable[[int], Pixels],
+) -> Tile:
+    x, y = corner
+    width, height = min(TILE_PX, canvas.width_px - x), min(TILE_PX, canvas.height_px - y)
+    # The window reaches beyond the tile by what blending sees, beyond the canvas too.
+    wx, wy = x - REACH, y - REACH
+    ww, wh = TILE_PX + 2 * REACH, TILE_PX + 2 * REACH
+    label = label_window(views, worth, canvas, wx, wy, ww, wh)
+    blend = MultiBand(ww, wh)
+    for i in np.unique(label[label >= 0]):
+        mine = label == i
+        x0, x1 = _extent(mine.any(axis=0), ww)
+        y0, y1 = _extent(mine.any(axis=1), wh)
+        at = photo_map(views[i], canvas, wx + x0, wy + y0, x1 - x0, y1 - y0)
+        warped = cv2.remap(
+            read(int(i)), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+        )
+        layer = np.asarray(cv2.LUT(warped, tables[i]), np.float32)
+        blend.add(layer, mine[y0:y1, x0:x1].astype(np.float32), x0, y0)
+    inner = (slice(REACH, REACH + height), slice(REACH, REACH + width))
+    own = label[inner]
+    covered = own >= 0
+    rgb = np.where(covered[..., None], blend.result()[inner], 0).astype(np.uint8)
+    return Tile(x, y, rgb, np.where(covered, 255, 0).astype(np.uint8), (own + 1).astype(np.uint16))
+
+
+def _extent(used: npt.NDArray[np.bool_], size: int) -> tuple[int, int]:
+    """Where it is used, grown by the reach of blending, aligned."""
+    where = np.flatnonzero(used)
+    low = max(0, (int(where[0]) - REACH) // ALIGN * ALIGN)
+    high = min(size, -(-(int(where[-1]) + 1 + REACH) // ALIGN) * ALIGN)
+    return low, high

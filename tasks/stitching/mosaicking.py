@@ -1,0 +1,127 @@
+"""Photos of one surface become one metric mosaic (paper, section 3.1, after Brown & Lowe 2007)."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from schemas.photo import Photo
+from schemas.problem import BadInput
+from schemas.settings import StitchSettings
+from schemas.surface import Surface
+from tasks.stitching.canvas import Canvas, lay_out
+from tasks.stitching.compositing import Pixels, Tile, composite
+from tasks.stitching.gain import solve_gains
+from tasks.stitching.pairs import PhotoFeatures
+from tasks.stitching.placement import Fate, fates, unusable
+from tasks.stitching.prior import plane_frame
+from tasks.stitching.solution import Solved, neighbours, solve
+from tasks.stitching.view import Array
+
+PLACED_WORTH = 1e-3  # a photo placed by its pose alone fills only what no solved photo shows
+
+
+@dataclass(frozen=True)
+class Registered:
+    """Where every photo lies, and on what canvas."""
+
+    photos: tuple[Photo, ...]
+    fates: tuple[Fate, ...]  # one a photo
+    solved: Solved  # indexed as `photos`
+    canvas: Canvas
+    surface: Surface | None  # whose frame the canvas is in
+    scale_from: str
+    pairs: tuple[tuple[int, int], ...]  # neighbours among the photos that are in the mosaic
+
+    @property
+    def shown(self) -> list[int]:
+        return [i for i, fate in enumerate(self.fates) if fate.view is not None]
+
+
+def register_photos(
+    name: str,
+    surface: Surface | None,
+    photos: Sequence[Photo],
+    features: Sequence[PhotoFeatures],
+    settings: StitchSettings,
+    on_progress: Callable[[float], None],
+) -> Registered:
+    """Raises BadInput where no photo finds a place."""
+    bad = unusable(photos, settings.min_sharpness)
+    good = [i for i in range(len(photos)) if i not in bad]
+    kept, kept_features = [photos[i] for i in good], [features[i] for i in good]
+    frame = plane_frame(kept, surface)
+    pairs = neighbours(kept_features, frame)
+    sigmas = [p.focal_sigma for p in kept]
+    solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress)
+    found = fates(frame.priors, solved.views, kept_features)
+    if len(kept) == 1 and found[0].view is None:
+        found = [
+            Fate("placed", "the only photo: taken to look squarely at the surface", frame.priors[0].view)
+        ]
+    every = [Fate("rejected", bad.get(i, "")) for i in range(len(photos))]
+    for i, fate in zip(good, found, strict=True):
+        every[i] = fate
+    if all(fate.view is None for fate in every):
+        raise BadInput(
+            name,
+            f"none of its {len(photos)} photos finds a place ({photos[0].name}: {every[0].reason})",
+            "Give photos that overlap by a third or more, or their poses",
+        )
+    scale_from = frame.scale_from
+    if frame.surface is None and settings.gsd_mm_px is not None:
+        every, scale_from = _to_stated_gsd(every, settings.gsd_mm_px / 1000.0), "stated GSD"
+    gsd = None if settings.gsd_mm_px is None else settings.gsd_mm_px / 1000.0
+    canvas = lay_out(name, [f.view for f in every if f.view is not None], frame.surface, gsd)
+    indexed = _reindexed(solved, good)
+    among = tuple((good[a], good[b]) for a, b in pairs if every[good[a]].view and every[good[b]].view)
+    return Registered(tuple(photos), tuple(every), indexed, canvas, frame.surface, scale_from, among)
+
+
+def blend_photos(
+    registered: Registered, read: Callable[[int], Pixels], on_progress: Callable[[float], None]
+) -> tuple[Array, Iterator[Tile]]:
+    """Gains of all photos (1 where not shown) and the tiles. `read(i)`: RGB of photo i."""
+    shown = registered.shown
+    position = {i: k for k, i in enumerate(shown)}
+    views = [view for i in shown if (view := registered.fates[i].view) is not None]
+    pairs = [(position[a], position[b]) for a, b in registered.pairs]
+    gains = solve_gains(views, lambda k: read(shown[k]), pairs, lambda f: on_progress(0.3 * f))
+    every = np.ones(len(registered.photos))
+    every[shown] = gains
+    tiles = composite(
+        registered.canvas,
+        views,
+        [_worth(registered, i) for i in shown],
+        gains,
+        lambda k: read(shown[k]),
+        lambda f: on_progress(0.3 + 0.7 * f),
+    )
+    return every, (replace(tile, source=_renumbered(tile.source, shown)) for tile in tiles)
+
+
+def _worth(registered: Registered, index: int) -> float:
+    """Sharp photos before blurred ones, solved before placed."""
+    median = float(np.median([registered.photos[i].sharpness for i in registered.shown]))
+    sharp = min(1.0, registered.photos[index].sharpness / median) if median > 0 else 1.0
+    return sharp if registered.fates[index].status == "solved" else PLACED_WORTH
+
+
+def _renumbered(source: npt.NDArray[np.uint16], shown: Sequence[int]) -> npt.NDArray[np.uint16]:
+    return np.array([0, *(i + 1 for i in shown)], np.uint16)[source]
+
+
+def _to_stated_gsd(every: Sequence[Fate], gsd_m: float) -> list[Fate]:
+    """All views scaled so that a pixel of the median photo covers the stated ground."""
+    scale = gsd_m / float(np.median([f.view.units_per_px for f in every if f.view is not None]))
+    return [f if f.view is None else replace(f, view=f.view.moved(scale, 0.0, np.zeros(2))) for f in every]
+
+
+def _reindexed(solved: Solved, good: Sequence[int]) -> Solved:
+    return replace(
+        solved,
+        views={good[i]: view for i, view in solved.views.items()},
+        matches={good[i]: count for i, count in solved.matches.items()},
+        rms_px={good[i]: rms for i, rms in solved.rms_px.items()},
+    )

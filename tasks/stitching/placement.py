@@ -1,0 +1,130 @@
+"""What becomes of each photo: solved by its matches, placed by its pose, or rejected, and why."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from schemas.photo import Photo
+from tasks.stitching.pairs import PhotoFeatures
+from tasks.stitching.prior import Prior
+from tasks.stitching.view import Array, View
+
+BLURRED = 0.3  # of the median sharpness: scenes differ by a fifth, 4 px of blur by four to ten
+STRONG = 0.02 / 3  # response of a feature that is no noise
+TEXTURED = 200  # strong features that a photo has for sure when it could have been matched
+OVERLAP = 0.3  # share of a photo that solved ones must cover, before not matching them speaks against it
+FAR_SIGMAS = 5.0  # a solved photo so far from its stated position is worth a word
+NEAREST = 3  # solved photos whose position errors a placed one borrows
+
+Status = Literal["solved", "placed", "rejected"]
+
+
+@dataclass(frozen=True)
+class Fate:
+    status: Status
+    reason: str = ""
+    view: View | None = None
+
+
+def unusable(photos: Sequence[Photo], min_sharpness: float | None) -> dict[int, str]:
+    """Photos that are not even matched, and why: blurred, or the same file twice."""
+    reasons: dict[int, str] = {}
+    median = float(np.median([p.sharpness for p in photos]))
+    least = BLURRED * median if min_sharpness is None else min_sharpness
+    first: dict[str, str] = {}
+    for i, photo in enumerate(photos):
+        twin = first.setdefault(photo.file.sha256, photo.name)
+        if twin != photo.name:
+            reasons[i] = f"the same picture as {twin}"
+        elif photo.sharpness < least and photo.exposure > 0.0:
+            share = f"sharpness {photo.sharpness:.3g}, its neighbours' median {median:.3g}"
+            reasons[i] = f"blurred ({share})"
+    return reasons
+
+
+def fates(
+    priors: Sequence[Prior],
+    solved: dict[int, View],
+    features: Sequence[PhotoFeatures],
+) -> list[Fate]:
+    """One a photo. `solved`: views of those held by their matches."""
+    result = []
+    for i, prior in enumerate(priors):
+        if i in solved:
+            result.append(Fate("solved", _far_from_prior(solved[i], prior), solved[i]))
+        elif not prior.has_position:
+            what = "the rest of the photos" if solved else "any other photo"
+            result.append(Fate("rejected", f"does not match {what}, and its position is not known"))
+        else:
+            view = _place(prior, priors, solved)
+            if view is None:
+                result.append(Fate("rejected", "no photo could be matched, and the distance is not known"))
+            elif _should_match(view, features[i], solved, features):
+                reason = (
+                    "shows texture but does not match the photos around its stated position: another place"
+                )
+                result.append(Fate("rejected", reason))
+            else:
+                sigma = float(prior.sigma_position[:2].max())
+                reason = f"by its stated position alone (± {sigma:.2f} m): too little texture to match"
+                result.append(Fate("placed", reason, view))
+    return result
+
+
+def _far_from_prior(view: View, prior: Prior) -> str:
+    known = np.isfinite(prior.sigma_position)
+    off = np.abs(view.C - prior.view.C)[known] / prior.sigma_position[known]
+    if off.size == 0 or off.max() < FAR_SIGMAS:
+        return ""
+    metres = float(np.linalg.norm((view.C - prior.view.C)[known]))
+    return f"lies {metres:.2f} m from its stated position"
+
+
+def _place(prior: Prior, priors: Sequence[Prior], solved: dict[int, View]) -> View | None:
+    """The prior, moved as the nearest solved photos moved from theirs: position errors walk slowly."""
+    view = prior.view
+    if not solved:
+        return view if np.isfinite(prior.sigma_position[2]) else None
+    known = [k for k in solved if priors[k].has_position]
+    if not known:
+        return None
+    distance = [float(np.linalg.norm(priors[k].view.C[:2] - view.C[:2])) for k in known]
+    near = [known[k] for k in np.argsort(distance, kind="stable")[:NEAREST]]
+    moved = np.mean([solved[k].C - priors[k].view.C for k in near], axis=0)
+    C = view.C + moved
+    if not np.isfinite(prior.sigma_position[2]):
+        C[2] = float(np.median([solved[k].C[2] for k in near]))
+    same = [
+        v.camera for k, v in solved.items() if priors[k].view.camera.model_dump() == view.camera.model_dump()
+    ]
+    return replace(view, C=C, camera=same[0] if same else view.camera)
+
+
+def _should_match(
+    view: View, own: PhotoFeatures, solved: dict[int, View], features: Sequence[PhotoFeatures]
+) -> bool:
+    """Both it and the solved photos that cover it have texture: then not matching means another place."""
+    if not solved or _strong(own) < TEXTURED:
+        return False
+    if float(np.median([_strong(features[k]) for k in solved])) < TEXTURED:
+        return False
+    w, h = view.camera.width_px - 1.0, view.camera.height_px - 1.0
+    x, y = np.meshgrid(np.linspace(0, w, 12), np.linspace(0, h, 9))
+    uv = view.to_plane(np.column_stack([x.ravel(), y.ravel()]))
+    covered = np.zeros(len(uv), bool)
+    for other in solved.values():
+        covered |= _inside(other, uv)
+    return float(covered.mean()) > OVERLAP
+
+
+def _inside(view: View, uv: Array) -> Array:
+    px = view.to_undistorted(uv)
+    size = np.array([view.camera.width_px - 1, view.camera.height_px - 1])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((px >= 0) & (px <= size)).all(axis=1))
+
+
+def _strong(features: PhotoFeatures) -> int:
+    return int((features.response > STRONG).sum())

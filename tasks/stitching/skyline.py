@@ -1,0 +1,54 @@
+"""Cholesky in a skyline: solves the banded systems of photo blocks, with the same bits for any number of
+threads (LAPACK's threads change the last ones)."""
+
+import numba
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from tasks.stitching.view import Array
+
+
+def solve_positive(A: Array, b: Array, shared: int = 0) -> Array:
+    """x of A x = b for a symmetric positive definite (N, N) A, ordered to a narrow band first. The last
+    `shared` unknowns touch all others and stay last.
+
+    Raises np.linalg.LinAlgError where A is not positive definite."""
+    own = len(b) - shared
+    banded = reverse_cuthill_mckee(csr_matrix(A[:own, :own] != 0), symmetric_mode=True)
+    order = np.concatenate([banded, np.arange(own, len(b))]).astype(np.int64)
+    permuted = np.ascontiguousarray(A[np.ix_(order, order)])
+    filled = permuted != 0
+    first = np.argmax(filled, axis=1).astype(np.int64)
+    x = np.empty(len(b))
+    if not _factor_and_solve(permuted, first, b[order].astype(float), x):
+        raise np.linalg.LinAlgError("matrix is not positive definite")
+    result = np.empty_like(x)
+    result[order] = x
+    return result
+
+
+@numba.njit(cache=True, nogil=True)
+def _factor_and_solve(A: Array, first: Array, b: Array, x: Array) -> bool:
+    n = len(b)
+    for i in range(n):
+        for j in range(first[i], i + 1):
+            total = A[i, j]
+            for k in range(max(first[i], first[j]), j):
+                total -= A[i, k] * A[j, k]
+            if j < i:
+                A[i, j] = total / A[j, j]
+            elif total <= 0.0:
+                return False
+            else:
+                A[i, i] = np.sqrt(total)
+    for i in range(n):
+        total = b[i]
+        for k in range(first[i], i):
+            total -= A[i, k] * x[k]
+        x[i] = total / A[i, i]
+    for i in range(n - 1, -1, -1):
+        x[i] /= A[i, i]
+        for k in range(first[i], i):
+            x[k] -= A[i, k] * x[i]
+    return True

@@ -1,0 +1,111 @@
+"""The paper's registration, whole: match, verify, average, adjust; what the matches hold, metrically."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tasks.stitching.adjustment import Adjusted, adjust
+from tasks.stitching.averaging import Guess, average
+from tasks.stitching.candidates import candidate_pairs
+from tasks.stitching.pairs import PhotoFeatures, match_pairs
+from tasks.stitching.prior import PlaneFrame
+from tasks.stitching.tracks import Observations, build_tracks
+from tasks.stitching.view import View
+
+LEAST_OBSERVATIONS = 12  # a photo with fewer points left is not held by them
+LEAST_KEPT = 0.4  # nor one most of whose points the adjustment threw out
+LARGEST_SCALE = 5.0  # against the median photo: beyond, it has shrunk to nothing or flown away
+LARGEST_RMS_PX = 3.0  # per 2 MP photo; more is a photo in a wrong place
+ATTEMPTS = 4
+
+
+@dataclass(frozen=True)
+class Solved:
+    views: dict[int, View]  # photos held by their matches
+    matches: dict[int, int]  # points that hold each
+    rms_px: dict[int, float]  # of their residuals, in pixels of the photo
+    sigma_px: float
+    false_edges: int
+
+
+def solve(
+    features: Sequence[PhotoFeatures],
+    frame: PlaneFrame,
+    focal_sigmas: Sequence[float],
+    pairs: Sequence[tuple[int, int]],
+    ransac_px: float,
+    on_progress: Callable[[float], None],
+) -> Solved:
+    """Views of all photos that the matches hold together."""
+    edges = match_pairs(pairs, features, frame.priors, ransac_px, lambda f: on_progress(0.6 * f))
+    matched = len(edges)
+    for _ in range(ATTEMPTS):
+        guess = average(edges, features, frame.priors)
+        held = _anchored(guess, frame)
+        edges = [e for e in guess.edges if e.a in held and e.b in held]
+        observations = build_tracks(edges, features)
+        if len(observations.photo) == 0:
+            break
+        adjusted = adjust(
+            guess.views,
+            observations,
+            frame.priors,
+            frame.sigma_bias,
+            focal_sigmas,
+            lambda f: on_progress(0.6 + 0.4 * f),
+        )
+        loose = _loose(observations, adjusted)
+        if not loose:
+            return _solved(adjusted, matched - len(edges))
+        edges = [e for e in edges if e.a not in loose and e.b not in loose]
+    return Solved({}, {}, {}, 0.0, matched)
+
+
+def neighbours(features: Sequence[PhotoFeatures], frame: PlaneFrame) -> list[tuple[int, int]]:
+    return candidate_pairs(
+        frame.priors, [f.scale.astype(np.float64) for f in features], [f.descriptors for f in features]
+    )
+
+
+def _anchored(guess: Guess, frame: PlaneFrame) -> set[int]:
+    """Photos of every connected group that its priors place; without any position, the largest group."""
+    count = int(guess.component.max(initial=-1)) + 1
+    held: set[int] = set()
+    for number in range(count):
+        members = np.flatnonzero(guess.component == number)
+        positioned = any(frame.priors[i].has_position for i in members)
+        if len(members) >= 2 and (positioned or (number == 0 and frame.scale_from == "none")):
+            held |= {int(i) for i in members}
+    return held
+
+
+def _loose(observations: Observations, adjusted: Adjusted) -> set[int]:
+    """Photos that the adjustment could not hold: too few points, most thrown out, large residuals, or a
+    scale that has run away."""
+    photos = len(adjusted.views)
+    before = np.bincount(observations.photo, minlength=photos)
+    after = np.bincount(adjusted.observations.photo, minlength=photos)
+    squares = (adjusted.residual_px**2).sum(axis=1)
+    rms = np.sqrt(np.bincount(adjusted.observations.photo, squares, minlength=photos) / np.maximum(after, 1))
+    size = np.array([v.camera.width_px * v.camera.height_px for v in adjusted.views])
+    allowed = LARGEST_RMS_PX * np.maximum(1.0, np.sqrt(size / 2.0e6))
+    bad = (after < np.maximum(LEAST_OBSERVATIONS, LEAST_KEPT * before)) | (rms > allowed)
+    behind = np.array([v.C[2] <= 0 or not np.isfinite(v.outline_uv).all() for v in adjusted.views])
+    scale = np.log([v.units_per_px for v in adjusted.views])
+    odd = np.abs(scale - np.median(scale[before > 0])) > np.log(LARGEST_SCALE)
+    return {int(i) for i in np.flatnonzero((bad | behind | odd) & (before > 0))}
+
+
+def _solved(adjusted: Adjusted, false_edges: int) -> Solved:
+    photo = adjusted.observations.photo
+    count = np.bincount(photo, minlength=len(adjusted.views))
+    squares = np.bincount(photo, (adjusted.residual_px**2).sum(axis=1), minlength=len(adjusted.views))
+    seen = np.flatnonzero(count)
+    return Solved(
+        views={int(i): adjusted.views[i] for i in seen},
+        matches={int(i): int(count[i]) for i in seen},
+        rms_px={int(i): float(np.sqrt(squares[i] / count[i])) for i in seen},
+        sigma_px=adjusted.sigma_px,
+        false_edges=false_edges,
+    )

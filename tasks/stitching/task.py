@@ -1,0 +1,181 @@
+"""Stages: stitch the photos of a surface; let a photo stand for itself."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from artifacts import store
+from artifacts.mosaic import MosaicWriter
+from artifacts.page import Page, page_key
+from artifacts.picture import markdown_of, thumbnail
+from schemas.contract import Matrix3
+from schemas.mosaic import Mosaic, PhotoPlacement
+from schemas.photo import Features, Photo
+from schemas.problem import BadInput, LeftOut
+from schemas.settings import StitchSettings
+from schemas.surface import Surface
+from tasks.stage import progress, stage
+from tasks.stitching.compositing import Pixels, Tile
+from tasks.stitching.mosaicking import Registered, blend_photos, register_photos
+from tasks.stitching.pairs import PhotoFeatures
+from tasks.stitching.undistortion import undistorted_tile
+from tasks.stitching.view import Array
+
+REMEDY = {
+    "blurred": "Shoot it again, slower or with a shorter exposure",
+    "the same": "Nothing to do",
+}
+
+
+def pages(inputs: Mapping[str, Any], mosaic: Mosaic) -> list[Page]:
+    picture, _ = thumbnail(mosaic)
+    counts = ", ".join(
+        f"{sum(p.status == status for p in mosaic.placements)} {status}"
+        for status in ("solved", "placed", "rejected")
+    )
+    gsd = "scale not known" if mosaic.gsd_mm_px is None else f"{mosaic.gsd_mm_px:.3g} mm/px"
+    text = f"### Mosaic of {mosaic.name}: {counts}; {gsd} from {mosaic.scale_from}"
+    rows = [
+        {
+            "photo": p.name,
+            "status": p.status,
+            "reason": p.reason,
+            "matches": p.matches,
+            "rms_px": None if p.rms_px is None else round(p.rms_px, 3),
+            "gain": round(p.gain, 3),
+        }
+        for p in mosaic.placements
+    ]
+    return [
+        Page(key=page_key("mosaic", mosaic.name), markdown=f"{text}\n\n{markdown_of(picture, mosaic.name)}"),
+        Page(key=page_key("photos", mosaic.name), table=rows),
+    ]
+
+
+@stage(pages=pages)
+def stitch(
+    name: str,
+    surface: Surface | None,
+    photos: tuple[Photo, ...],
+    features: tuple[Features, ...],
+    settings: StitchSettings,
+) -> Mosaic:
+    """One mosaic of all photos of a surface; every photo is solved, placed or rejected with a reason."""
+    if not photos:
+        raise BadInput(name, "has no photo", "Give it photos, or leave it out")
+    described = {f.photo: f for f in features}
+    ordered = sorted(photos, key=lambda p: p.name)
+    found = [_features(described[p.name]) for p in ordered]
+    registered = register_photos(name, surface, ordered, found, settings, lambda f: progress(0.5 * f))
+    gains, tiles = blend_photos(registered, _reader(ordered), lambda f: progress(0.5 + 0.5 * f))
+    canvas, metric = registered.canvas, registered.scale_from != "none"
+    placements = tuple(_placement(registered, i, float(gains[i])) for i in range(len(ordered)))
+    solved = registered.solved
+    squares = [solved.matches[i] * rms**2 for i, rms in solved.rms_px.items()]
+    return _written(
+        tiles,
+        name=name,
+        surface=registered.surface,
+        width_px=canvas.width_px,
+        height_px=canvas.height_px,
+        gsd_mm_px=canvas.gsd * 1000.0 if metric else None,
+        scale_from=registered.scale_from,
+        origin_uv_m=(canvas.left, canvas.top) if metric else (0.0, 0.0),
+        photos=tuple(_as_adjusted(registered, i) for i in range(len(ordered))),
+        placements=placements,
+        rms_px=float(np.sqrt(sum(squares) / sum(solved.matches.values()))) if squares else None,
+        left_out=tuple(
+            LeftOut(item=p.name, stage="stitching", what=p.reason, remedy=_remedy(p.reason))
+            for p in placements
+            if p.status == "rejected"
+        ),
+    )
+
+
+@stage(pages=pages)
+def single(photo: Photo, gsd_mm_px: float | None) -> Mosaic:
+    """A photo that stands for itself: undistorted, one placement; unaltered where the lens is ideal."""
+    identity: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    return _written(
+        [undistorted_tile(_reader([photo])(0), photo.camera)],
+        name=photo.name,
+        surface=None,
+        width_px=photo.camera.width_px,
+        height_px=photo.camera.height_px,
+        gsd_mm_px=gsd_mm_px,
+        scale_from="none" if gsd_mm_px is None else "stated GSD",
+        origin_uv_m=(0.0, 0.0),
+        photos=(photo,),
+        placements=(PhotoPlacement(name=photo.name, status="solved", H_mosaic_photo=identity),),
+        rms_px=None,
+        left_out=(),
+    )
+
+
+def _features(features: Features) -> PhotoFeatures:
+    with np.load(store.current().path(features.file)) as arrays:
+        return PhotoFeatures(arrays["xy"], arrays["scale"], arrays["response"], arrays["descriptors"])
+
+
+def _reader(photos: list[Photo]) -> Callable[[int], Pixels]:
+    paths: list[Path] = [store.current().path(p.file) for p in photos]  # verified here, read from threads
+
+    def read(index: int) -> Pixels:
+        bgr = cv2.imread(str(paths[index]), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        if bgr is None:
+            raise BadInput(photos[index].name, "cannot be read", "Copy it again from the camera's card")
+        return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB))
+
+    return read
+
+
+def _placement(registered: Registered, index: int, gain: float) -> PhotoPlacement:
+    fate, solved = registered.fates[index], registered.solved
+    H = None if fate.view is None else _matrix(registered.canvas.H_mosaic_plane @ fate.view.H_plane_photo)
+    return PhotoPlacement(
+        name=registered.photos[index].name,
+        status=fate.status,
+        reason=fate.reason,
+        H_mosaic_photo=H,
+        matches=solved.matches.get(index, 0),
+        rms_px=solved.rms_px.get(index),
+        gain=gain,
+    )
+
+
+def _matrix(H: Array) -> Matrix3:
+    a, b, c = (tuple(float(x) for x in row) for row in H / H[2, 2])
+    return (a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])
+
+
+def _as_adjusted(registered: Registered, index: int) -> Photo:
+    view = registered.fates[index].view
+    photo = registered.photos[index]
+    return photo if view is None else photo.model_copy(update={"camera": view.camera})
+
+
+def _remedy(reason: str) -> str:
+    told = (remedy for begin, remedy in REMEDY.items() if reason.startswith(begin))
+    return next(told, "Check that it shows this surface, or shoot it again with more overlap")
+
+
+def _written(tiles: Iterable[Tile], **known: Any) -> Mosaic:
+    """The mosaic with its three files in the store."""
+    with store.current().scratch() as folder:
+        frame = f"surface {known['surface'].name}" if known["surface"] else "own plane"
+        with MosaicWriter(
+            folder, known["width_px"], known["height_px"], known["gsd_mm_px"], known["origin_uv_m"], frame
+        ) as writer:
+            for tile in tiles:
+                writer.put(tile.x, tile.y, tile.rgb, tile.coverage, tile.source)
+        gsd_mm_px = known["gsd_mm_px"]
+        return Mosaic(
+            **known,
+            image=store.current().put(writer.image),
+            coverage=store.current().put(writer.coverage),
+            source=store.current().put(writer.source),
+            covered_m2=None if gsd_mm_px is None else writer.covered_px * (gsd_mm_px / 1000.0) ** 2,
+        )

@@ -1,0 +1,132 @@
+"""A camera above the plane of the mosaic.
+
+Plane frame: u right, v up, w towards the viewer; the surface is w = 0. Metres where a scale is known, else
+the units of the first guess. Poses are camera-to-plane, as CameraPose gives them for the world."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from schemas.camera import Camera
+
+Array = npt.NDArray[np.float64]
+
+# A camera that looks straight at the plane, its top towards v: x → u, y (down) → −v, z (forward) → −w.
+FACING = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class View:
+    camera: Camera
+    R: Array  # (3, 3) R_plane_camera: columns are the camera's axes in the plane frame
+    C: Array  # (3,) position in the plane frame, C[2] > 0
+
+    @property
+    def H_plane_photo(self) -> Array:
+        """(3, 3): undistorted photo pixels to (u, v); the third coordinate is negative where the ray meets
+        the plane in front of the camera."""
+        u, v, w = self.C
+        rays = self.R @ np.linalg.inv(self.camera.K)
+        return np.stack([u * rays[2] - w * rays[0], v * rays[2] - w * rays[1], rays[2]])
+
+    def to_plane(self, undistorted_px: npt.ArrayLike) -> Array:
+        """(N, 2) plane points of (N, 2) undistorted pixels; NaN where the ray misses the plane."""
+        px = np.asarray(undistorted_px, dtype=float)
+        q = px @ self.H_plane_photo[:, :2].T + self.H_plane_photo[:, 2]
+        depth = np.where(q[:, 2] < -1e-9, q[:, 2], np.nan)
+        return np.asarray(q[:, :2] / depth[:, None])
+
+    def to_undistorted(self, uv: npt.ArrayLike) -> Array:
+        """(N, 2) undistorted pixels of (N, 2) plane points; NaN behind the camera."""
+        return np.asarray(self._ideal(uv) * self.camera.focal_px + self.camera.principal_px)
+
+    def to_photo(self, uv: npt.ArrayLike) -> Array:
+        """(N, 2) pixels of the photo as taken, distortion included."""
+        return np.asarray(
+            self.camera.distort(self._ideal(uv)) * self.camera.focal_px + self.camera.principal_px
+        )
+
+    def _ideal(self, uv: npt.ArrayLike) -> Array:
+        in_camera = self._in_camera(np.asarray(uv, dtype=float))
+        z = np.where(in_camera[:, 2] > 1e-9, in_camera[:, 2], np.nan)
+        return np.asarray(in_camera[:, :2] / z[:, None])
+
+    def _in_camera(self, uv: Array) -> Array:
+        points = np.column_stack([uv, np.zeros(len(uv))])
+        return np.asarray((points - self.C) @ self.R)
+
+    @property
+    def outline_uv(self) -> Array:
+        """(16, 2) footprint on the plane, along the photo's border; NaN where it looks past the plane."""
+        right, bottom = self.camera.width_px - 1.0, self.camera.height_px - 1.0
+        t = np.linspace(0, 1, 4, endpoint=False)
+        zero = np.zeros(4)
+        x = np.concatenate([t * right, zero + right, (1 - t) * right, zero])
+        y = np.concatenate([zero, t * bottom, zero + bottom, (1 - t) * bottom])
+        return self.to_plane(np.column_stack([x, y]))
+
+    @property
+    def centre_uv(self) -> Array:
+        """(2,) where the middle of the photo meets the plane."""
+        middle = [[(self.camera.width_px - 1) / 2, (self.camera.height_px - 1) / 2]]
+        return np.asarray(self.to_plane(middle)[0])
+
+    @property
+    def units_per_px(self) -> float:
+        """Plane units that a pixel covers in the middle of the photo (root of its area)."""
+        x, y = (self.camera.width_px - 1) / 2, (self.camera.height_px - 1) / 2
+        a, b, c = self.to_plane([[x, y], [x + 1, y], [x, y + 1]])
+        return float(np.sqrt(abs(np.linalg.det(np.stack([b - a, c - a])))))
+
+    def moved(self, scale: float, angle_rad: float, shift: Array) -> "View":
+        """Under the similarity q → scale · rotation · q + shift of the plane."""
+        turn = np.eye(3)
+        c, s = np.cos(angle_rad), np.sin(angle_rad)
+        turn[:2, :2] = [[c, -s], [s, c]]
+        return replace(self, R=turn @ self.R, C=scale * (turn @ self.C) + np.array([shift[0], shift[1], 0.0]))
+
+
+def with_lens(camera: Camera, focal_px: float, k1: float) -> Camera:
+    """Not model_copy: it would carry over the cached matrix."""
+    return Camera.model_validate(camera.model_dump() | {"focal_px": focal_px, "k1": k1})
+
+
+def shrunk(view: View, factor: int) -> View:
+    """The view of the photo averaged over squares of `factor` pixels."""
+    if factor == 1:
+        return view
+    camera = view.camera
+    width, height = max(camera.width_px // factor, 1), max(camera.height_px // factor, 1)
+    sx, sy = width / camera.width_px, height / camera.height_px  # the same but for a cut pixel
+    cx, cy = camera.principal_px
+    values = {
+        "width_px": width,
+        "height_px": height,
+        "focal_px": camera.focal_px * sx,
+        "cx_px": (cx + 0.5) * sx - 0.5,
+        "cy_px": (cy + 0.5) * sy - 0.5,
+    }
+    return replace(view, camera=Camera.model_validate(camera.model_dump() | values))
+
+
+def rotation(vector: Array) -> Array:
+    """(…, 3, 3) from rotation vectors (…, 3), radians (Rodrigues)."""
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vector, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    safe = np.maximum(angle, 1e-12)
+    turn = np.eye(3) + np.sin(safe) / safe * cross + (1 - np.cos(safe)) / safe**2 * (cross @ cross)
+    return np.asarray(turn)
+
+
+def rotation_vector(R: Array) -> Array:
+    """(…, 3) of rotations (…, 3, 3) by less than 180°."""
+    twice = np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1
+    )
+    sine = np.linalg.norm(twice, axis=-1) / 2
+    cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    return np.asarray(twice * (angle / np.maximum(2 * sine, 1e-12))[..., None])

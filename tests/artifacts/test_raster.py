@@ -1,0 +1,62 @@
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+
+from artifacts.page import page_key
+from artifacts.raster import MosaicRaster, TiffWindows, read_mask, write_mask
+from schemas.problem import BadInput
+
+RNG = np.random.default_rng(0)
+
+
+@pytest.mark.parametrize("channels", [(), (3,)])
+@pytest.mark.parametrize("layout", [{"tile": (64, 128)}, {"rowsperstrip": 50}, {}])
+@pytest.mark.parametrize("compression", [None, "zlib"])
+def test_any_window_of_any_layout(
+    tmp_path: Path, channels: tuple[int, ...], layout: dict[str, object], compression: str | None
+) -> None:
+    pixels = RNG.integers(0, 255, (211, 317, *channels), dtype=np.uint8)
+    photometric = "rgb" if channels else "minisblack"
+    tifffile.imwrite(tmp_path / "a.tif", pixels, compression=compression, photometric=photometric, **layout)
+    windows = TiffWindows(tmp_path / "a.tif", "wall")
+    assert (windows.height_px, windows.width_px) == (211, 317)
+    for y0, y1, x0, x1 in ((0, 211, 0, 317), (60, 70, 120, 135), (210, 211, 316, 317), (5, 5, 0, 317)):
+        assert (windows.read(y0, y1, x0, x1) == pixels[y0:y1, x0:x1]).all()
+    windows.close()
+
+
+def test_sixteen_bits_stay_sixteen_bits(tmp_path: Path) -> None:
+    pixels = RNG.integers(0, 60_000, (100, 90), dtype=np.uint16)
+    tifffile.imwrite(tmp_path / "a.tif", pixels, tile=(32, 32))
+    with closing(TiffWindows(tmp_path / "a.tif", "wall")) as windows:
+        assert (windows.read(10, 99, 0, 90) == pixels[10:99]).all()
+
+
+def test_valid_is_covered_and_not_masked(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "i.tif", np.zeros((50, 60, 3), np.uint8), tile=(32, 32), photometric="rgb")
+    covered = np.full((50, 60), 255, np.uint8)
+    covered[:10] = 0
+    tifffile.imwrite(tmp_path / "c.tif", covered, tile=(32, 32))
+    masked = np.zeros((50, 60), dtype=bool)
+    masked[:, :5] = True
+    write_mask(masked, tmp_path / "m.png")
+    assert (read_mask(tmp_path / "m.png", "wall") == np.where(masked, 255, 0)).all()
+    with MosaicRaster(tmp_path / "i.tif", tmp_path / "c.tif", "wall", tmp_path / "m.png") as raster:
+        valid = raster.valid(0, 50, 0, 60)
+    assert (valid == ((covered > 0) & ~masked)).all()
+    write_mask(masked[:40], tmp_path / "short.png")
+    with pytest.raises(BadInput, match="differ in size"):
+        MosaicRaster(tmp_path / "i.tif", tmp_path / "c.tif", "wall", tmp_path / "short.png")
+
+
+def test_what_is_no_tiff_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.tif").write_text("not a picture")
+    with pytest.raises(BadInput, match=r"pier: its mosaic cannot be read"):
+        TiffWindows(tmp_path / "a.tif", "pier")
+
+
+def test_keys_hold_only_what_the_dashboard_takes() -> None:
+    assert page_key("cracks", "Web_left (2).JPG") == "cracks-web-left-2-jpg"

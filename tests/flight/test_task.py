@@ -1,0 +1,177 @@
+"""Whole flights on the simulated vehicle: client and vehicle are two processes on a real socket."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from artifacts import store
+from artifacts.flight_log import MAVLINK, ORIGINAL, messages
+from schemas.flight_log import FlightLog
+from schemas.geodesy import GeoOrigin
+from schemas.mission import mission_items
+from schemas.problem import BadInput
+from tasks.flight.link import Link
+from tasks.flight.task import convert, fly, import_log
+from tasks.flight.upload import read_back
+from tasks.simulation.autopilot import Faults
+from tasks.simulation.trajectory import fly_mission
+from tasks.simulation.vehicle import start_vehicle
+from tests.development_data import development_data
+from tests.flight.wall_plan import wall_plan
+
+PLAN = wall_plan(4, 2)
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> Iterator[str]:
+    with start_vehicle(PLAN, 3) as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def log(own_store: store.Store, vehicle: str) -> FlightLog:
+    return fly.bare(PLAN, "1", vehicle, 10.0)
+
+
+def test_flies_what_was_planned(log: FlightLog) -> None:
+    """The log against the truth that photos are rendered from: the same function on the same mission."""
+    true = fly_mission(mission_items(PLAN), PLAN.origin, PLAN.home_m, PLAN.vehicle, seed=3)
+    assert log.vehicle == "ArduCopter simulated by Hairline"
+    assert not log.missed
+    assert [s.photo for s in log.shots] == [w.photo for w in PLAN.shooting_points]
+    for shot, flown in zip(log.shots, true.shots, strict=True):
+        assert shot.reported
+        assert shot.pose.position_m == pytest.approx(flown.estimated_pose.position_m, abs=0.012)  # 1e-7°
+        assert shot.pose.yaw_deg == pytest.approx(flown.estimated_pose.yaw_deg, abs=0.01)
+        assert shot.time_s == pytest.approx(flown.time_s, abs=0.1)
+    assert log.duration_s == pytest.approx(true.time_s[-1], abs=0.15)
+    track = np.array([p.position_m for p in log.track])
+    assert np.diff([p.time_s for p in log.track]).max() < 0.11
+    assert track == pytest.approx(true.estimated_m[::5][: len(track)], abs=0.012)
+
+
+def test_the_same_flight_has_the_same_archive(log: FlightLog, vehicle: str) -> None:
+    assert fly.bare(PLAN, "2", vehicle, 10.0) == log
+
+
+def test_the_archive_gives_the_flight_back(log: FlightLog) -> None:
+    again = import_log.bare(log.archive, "flight.mcap", PLAN)
+    assert again == log
+
+
+def test_a_truncated_archive_gives_what_it_has(log: FlightLog, tmp_path: Path) -> None:
+    whole = store.current().path(log.archive).read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: int(len(whole) * 0.6)])
+    part = import_log.bare(store.current().put(cut), "cut.mcap", PLAN)
+    assert 0.4 * log.duration_s < part.duration_s < 0.75 * log.duration_s
+    assert part.shots == log.shots[: len(part.shots)]
+    assert {s.photo for s in part.shots} | set(part.missed) == {s.photo for s in log.shots}
+
+
+def test_a_vehicle_that_refuses_to_arm_says_why_and_keeps_no_mission() -> None:
+    with start_vehicle(PLAN, 1, Faults(refuse_arm=True)) as url:
+        with pytest.raises(BadInput, match=r"refuses to arm.*PreArm: Compass not calibrated") as problem:
+            fly.bare(PLAN, "1", url, 1.5)
+        assert problem.value.item == url
+        with Link(url, 5.0) as link:
+            link.find_vehicle()
+            assert read_back(link) == ()
+
+
+def test_a_link_lost_in_flight_keeps_what_was_archived() -> None:
+    lost = r"not heard for 1\.5 s, (29|30) s after arming"
+    with start_vehicle(PLAN, 3, Faults(vanish_s=30.0)) as url, pytest.raises(BadInput, match=lost) as problem:
+        fly.bare(PLAN, "1", url, 1.5)
+    kept = Path(problem.value.remedy.split("kept in ")[1].split(";")[0])
+    assert kept.is_file()
+    part = import_log.bare(store.current().put(kept), "flight.mcap", PLAN)
+    assert part.duration_s == pytest.approx(30.0, abs=0.3)
+    assert part.shots
+    assert part.missed
+
+
+def test_a_silent_vehicle_is_named() -> None:
+    with start_vehicle(PLAN, 1, Faults(silent=True)) as url:
+        with pytest.raises(BadInput, match=r"no vehicle answered within 1 s.*powered") as problem:
+            fly.bare(PLAN, "1", url, 1.0)
+        assert problem.value.item == url
+
+
+def test_a_vehicle_far_from_home_does_not_arm(vehicle: str) -> None:
+    elsewhere = PLAN.model_copy(update={"origin": GeoOrigin(latitude_deg=-35.36, longitude_deg=149.165230)})
+    with pytest.raises(BadInput, match="362 m from the plan's home"):
+        fly.bare(elsewhere, "1", vehicle, 5.0)
+
+
+# -- logs of others ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "vehicle", "duration_s", "points"),
+    [
+        ("dronekit_flight.tlog", "ardupilotmega quadrotor", 575.53, 1573),
+        ("pymavlink_test.BIN", "ArduPlane V3.8.2-dev (8178ab40)", 0.934, 9),
+        ("pyulog_sample_log_small.ulg", "PX4 on CUBEPILOT_CUBEORANGE", 5.609, 27),
+    ],
+)
+def test_real_logs(name: str, vehicle: str, duration_s: float, points: int, tmp_path: Path) -> None:
+    path = development_data("logs") / name
+    out = tmp_path / "out.mcap"
+    convert(path, out)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out.mcap"]
+    log = import_log.bare(store.current().put(out), "out.mcap", None)
+    assert log.vehicle == vehicle
+    assert log.duration_s == pytest.approx(duration_s, abs=0.01)
+    assert len(log.track) == points
+    if name.endswith("tlog"):  # what is not in it is the radio's noise between frames
+        assert len(original_of(out, name)) > 0.98 * path.stat().st_size
+        assert path.read_bytes().startswith(original_of(out, name)[:100_000])
+    else:
+        assert original_of(out, name) == path.read_bytes()
+        assert import_log.bare(store.current().put(path), name, None).track == log.track
+
+
+def original_of(archive: Path, name: str) -> bytes:
+    """The log that an archive was converted from."""
+    if name.endswith("tlog"):
+        frames = [(time_ns, raw) for topic, time_ns, raw in messages(archive) if topic == MAVLINK]
+        return b"".join((time_ns // 1000).to_bytes(8, "big") + raw for time_ns, raw in frames)
+    return b"".join(block for topic, _, block in messages(archive) if topic == ORIGINAL)
+
+
+def test_logs_that_are_none(tmp_path: Path) -> None:
+    contents = {
+        "empty.tlog": b"",
+        "words.tlog": b"These are no frames at all. " * 50,
+        "noise.BIN": b"\xa3\x95" + bytes(range(256)) * 20,
+        "broken.ulg": b"ULog\x01\x12\x35\x01" + b"\0" * 8 + b"\xff" * 200,
+        "other.mcap": b"\x89MCAP0\r\n" + b"\xff" * 100,
+    }
+    for name, content in contents.items():
+        path = tmp_path / name
+        path.write_bytes(content)
+        with pytest.raises(BadInput, match=name):
+            import_log.bare(store.current().put(path), name, None)
+    for name in ("empty.tlog", "words.tlog", "broken.ulg", "other.mcap"):
+        with pytest.raises(BadInput, match=name):
+            convert(tmp_path / name, tmp_path / "out.mcap")
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(contents)
+
+
+def test_truncated_real_logs_give_what_they_have(tmp_path: Path) -> None:
+    logs = development_data("logs")
+    for name, share in (("dronekit_flight.tlog", 0.2), ("pymavlink_test.BIN", 0.9)):
+        whole = (logs / name).read_bytes()
+        cut = tmp_path / name
+        cut.write_bytes(whole[: int(len(whole) * share)])
+        assert import_log.bare(store.current().put(cut), name, None).track
+    cut = tmp_path / "cut.ulg"
+    shutil.copyfile(logs / "pyulog_sample_log_small.ulg", cut)
+    cut.chmod(0o600)
+    with cut.open("r+b") as stream:
+        stream.truncate(cut.stat().st_size * 2 // 3)
+    assert import_log.bare(store.current().put(cut), "cut.ulg", None).track

@@ -1,0 +1,56 @@
+"""`hairline init` writes a file that `hairline run` reads, every setting explained."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from flows.init_inspection import SECTIONS, described, init_inspection
+from flows.inspection_file import read_inspection
+from schemas.inspection import Inspection
+from schemas.problem import BadInput
+
+
+def site(tmp_path: Path, *names: str) -> Path:
+    folder = tmp_path / "North Pier: 2"
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+    return folder
+
+
+def test_what_lies_in_the_folder_is_found(tmp_path: Path) -> None:
+    folder = site(tmp_path, "scans/a.ply", "scans/b: c.e57", "photos/1.jpg", "photos/2.JPG", "flight.BIN")
+    inspection = read_inspection(init_inspection(folder, None))
+    assert inspection.name == "North-Pier-2"
+    assert [scan.file for scan in inspection.scans] == ["scans/a.ply", "scans/b: c.e57"]
+    assert [photos.folder for photos in inspection.photos] == ["photos"]
+    assert (inspection.flight, inspection.flight_log) == ("external", "flight.BIN")
+
+
+def test_the_explained_settings_are_the_defaults(tmp_path: Path) -> None:
+    path = init_inspection(site(tmp_path, "p/1.jpg"), "x")
+    text = path.read_text()
+    sections = text[text.index("\n# vehicle:") :]
+    uncommented = "\n".join(line[2:] for line in sections.splitlines() if line.startswith("# "))
+    settings = yaml.safe_load(uncommented)
+    assert settings.keys() == SECTIONS.keys()
+    assert Inspection.model_validate({"name": "x"} | settings) == Inspection(name="x")
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_most_settings_say_why(section: str) -> None:
+    lines = described(SECTIONS[section])
+    assert sum("  # " in line for line in lines) >= 0.6 * len(lines), lines
+
+
+def test_an_inspection_that_is_there_is_not_written_over(tmp_path: Path) -> None:
+    folder = site(tmp_path, "p/1.jpg")
+    init_inspection(folder, None)
+    with pytest.raises(BadInput, match="is there already"):
+        init_inspection(folder, None)
+
+
+def test_an_empty_folder_is_told(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="neither scans nor photos"):
+        init_inspection(tmp_path, None)

@@ -1,0 +1,61 @@
+"""A mistake in the inspection file is told by its key or line, with what to do."""
+
+from pathlib import Path
+
+import pytest
+
+from flows.inspection_file import existing, read_inspection
+from schemas.problem import BadInput
+
+
+def problem_of(tmp_path: Path, text: str) -> str:
+    path = tmp_path / "inspection.yaml"
+    path.write_text(text)
+    with pytest.raises(BadInput) as caught:
+        read_inspection(path)
+    assert caught.value.item == str(path)
+    return str(caught.value)
+
+
+def test_a_minimal_file_gets_every_default(tmp_path: Path) -> None:
+    path = tmp_path / "inspection.yaml"
+    path.write_text("name: bridge-7\nphotos:\n  - folder: photos\n")
+    inspection = read_inspection(path)
+    assert inspection.photos[0].stitch
+    assert inspection.detect.method == "hairline"
+    assert inspection.registration.tau_m == 0.10
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name: a\nphoto: []\n", "unknown key 'photo'"),
+        ("photos: []\n", "key 'name' is missing"),
+        ("name: a\ndetect: {method: magic}\n", "key 'detect.method' cannot be 'magic'"),
+        ("name: a\nplan: {overlap: 1.5}\n", "key 'plan.overlap' cannot be 1.5"),
+        ("name: ../../etc\n", "key 'name' cannot be '../../etc'"),
+        ("name: a\n  b: [\n", "is not valid YAML at line 2"),
+        ("", "holds no settings"),
+        ("- a\n", "holds no settings"),
+        ("name: a\ncamera: {width_px: 100, height_px: 100}\n", "focal_mm together with sensor_width_mm"),
+        ("name: a\nstitch: {ransac_px: .nan}\n", "key 'stitch.ransac_px'"),
+    ],
+)
+def test_a_mistake_is_named(tmp_path: Path, text: str, words: str) -> None:
+    assert words in problem_of(tmp_path, text)
+
+
+def test_a_file_that_is_absent_binary_or_a_folder_is_named(tmp_path: Path) -> None:
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00\x80")
+    for name, words in (
+        ("none.yaml", "no such file"),
+        ("binary.yaml", "cannot be read"),
+        ("", "is a folder"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            read_inspection(tmp_path / name)
+
+
+def test_a_path_that_does_not_exist_names_its_key(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="named by key 'scans'"):
+        existing(tmp_path, "scan.ply", "scans")

@@ -1,0 +1,121 @@
+"""Every kind of file that a folder of photos may hold: read right, or refused by name."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from schemas.problem import BadInput
+from tasks.photos.reading import read_photo
+
+
+def gradient(width: int = 96, height: int = 64) -> np.ndarray:
+    """(H, W, 3): red grows to the right, green downwards."""
+    rgb = np.full((height, width, 3), 90, np.uint8)
+    rgb[..., 0] = np.linspace(0, 250, width).astype(np.uint8)
+    rgb[..., 1] = np.linspace(0, 250, height).astype(np.uint8)[:, None]
+    return rgb
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
+def test_common_formats_give_the_same_pixels(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"photo.{suffix}"
+    Image.fromarray(gradient()).save(path, quality=98)
+    decoded = read_photo(path, path.name)
+    assert np.abs(decoded.pixels.astype(int) - gradient()).max() <= (6 if suffix == "jpg" else 0)
+    assert decoded.as_it_came == (suffix != "tif")
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_orientation_is_undone(tmp_path: Path, orientation: int) -> None:
+    upright = Image.fromarray(gradient())
+    undo = {
+        2: Image.Transpose.FLIP_LEFT_RIGHT,
+        3: Image.Transpose.ROTATE_180,
+        4: Image.Transpose.FLIP_TOP_BOTTOM,
+        5: Image.Transpose.TRANSPOSE,
+        6: Image.Transpose.ROTATE_90,
+        7: Image.Transpose.TRANSVERSE,
+        8: Image.Transpose.ROTATE_270,
+    }
+    stored = upright.transpose(undo[orientation]) if orientation > 1 else upright
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    stored.save(tmp_path / "turned.png", exif=exif)
+    decoded = read_photo(tmp_path / "turned.png", "turned.png")
+    np.testing.assert_array_equal(decoded.pixels, gradient())
+    assert decoded.orientation == orientation
+    assert decoded.as_it_came == (orientation == 1)
+
+
+def test_odd_pixel_formats_are_read_right(tmp_path: Path) -> None:
+    rgb = gradient()
+    grey = rgb[..., 0]
+    alpha = np.dstack([rgb, np.full(grey.shape, 17, np.uint8)])
+    Image.fromarray(grey).save(tmp_path / "grey.png")
+    Image.fromarray(alpha).save(tmp_path / "alpha.png")
+    Image.fromarray(grey.astype(np.uint16) * 257).save(tmp_path / "deep.png")
+    Image.fromarray(grey.astype(np.uint16) * 257).save(tmp_path / "deep.tif")
+    Image.fromarray(grey.astype(np.float32) / 255).save(tmp_path / "float.tif")
+    Image.fromarray(rgb).quantize(256).save(tmp_path / "palette.png")
+    expected = np.repeat(grey[..., None], 3, axis=2)
+    for name in ("grey.png", "deep.png", "deep.tif"):
+        np.testing.assert_array_equal(read_photo(tmp_path / name, name).pixels, expected)
+    assert np.abs(read_photo(tmp_path / "float.tif", "f").pixels.astype(int) - expected).max() <= 4
+    np.testing.assert_array_equal(read_photo(tmp_path / "alpha.png", "a").pixels, rgb)
+    assert np.abs(read_photo(tmp_path / "palette.png", "p").pixels.astype(int) - rgb).mean() < 6
+
+
+def test_cmyk_is_converted(tmp_path: Path) -> None:
+    Image.fromarray(gradient()).convert("CMYK").save(tmp_path / "print.jpg", quality=98)
+    decoded = read_photo(tmp_path / "print.jpg", "print.jpg")
+    assert np.abs(decoded.pixels.astype(int) - gradient()).mean() < 4
+    assert not decoded.as_it_came
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "what"),
+    [
+        ("empty.jpg", b"", "empty"),
+        ("notes.jpg", b"these are notes, no photo\n" * 40, "not an image"),
+        ("zeros.png", b"\x89PNG\r\n\x1a\n" + bytes(200), "zeros.png"),
+    ],
+)
+def test_what_is_no_photo_is_refused_by_name(tmp_path: Path, name: str, content: bytes, what: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(BadInput, match=what) as caught:
+        read_photo(tmp_path / name, name)
+    assert caught.value.item == name
+    assert caught.value.remedy
+
+
+def test_one_pixel_is_no_photo(tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((1, 1, 3), np.uint8)).save(tmp_path / "dot.png")
+    with pytest.raises(BadInput, match="1 × 1 px"):
+        read_photo(tmp_path / "dot.png", "dot.png")
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
+@settings(max_examples=25, deadline=None)
+@given(share=st.floats(0.02, 0.9), seed=st.integers(0, 10_000))
+def test_a_truncated_or_scrambled_file_never_gets_out_as_another_error(
+    tmp_path_factory: pytest.TempPathFactory, suffix: str, share: float, seed: int
+) -> None:
+    path = tmp_path_factory.getbasetemp() / f"hurt.{suffix}"
+    noisy = np.random.default_rng(1).integers(0, 255, (64, 96, 3)).astype(np.uint8)
+    Image.fromarray(noisy).save(path)
+    whole = bytearray(path.read_bytes())
+    path.write_bytes(whole[: int(len(whole) * share)])
+    with pytest.raises(BadInput) as caught:
+        read_photo(path, "hurt")
+    assert caught.value.item == "hurt"
+    for at in np.random.default_rng(seed).integers(0, len(whole), 20):
+        whole[at] ^= 0x5A
+    path.write_bytes(whole)
+    try:
+        read_photo(path, "hurt")
+    except BadInput as problem:
+        assert problem.item == "hurt"

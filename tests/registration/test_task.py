@@ -1,0 +1,60 @@
+"""The stages of registration: files in, model out."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from artifacts import store
+from schemas.problem import BadInput
+from schemas.settings import RegistrationSettings
+from tasks.registration.read_scan import read_scan
+from tasks.registration.task import ingest_scan, pages, register
+from tests.registration.site import measured_position
+
+
+@pytest.fixture(autouse=True)
+def a_store() -> Iterator[None]:
+    with store.temporary():
+        yield
+
+
+def test_model_of_two_stations(site_folder: Path) -> None:
+    scans = []
+    for k in (0, 3):
+        file = store.current().put(site_folder / f"station{k}.ply")
+        scans += ingest_scan.bare(file, f"station{k}", 1.0, measured_position(k), None)
+    model = register.bare(tuple(scans), RegistrationSettings())
+    assert [s.name for s in model.stations] == ["station0", "station3"]
+    assert len(model.pairs) == 1
+    cloud = read_scan(store.current().path(model.cloud))
+    assert len(cloud.points_m) == model.points
+    assert np.allclose(cloud.points_m.min(axis=0), model.min_m)
+    assert cloud.normals is not None
+    assert model == register.bare(tuple(scans), RegistrationSettings())
+    picture, table = pages({}, model)
+    assert picture.markdown is not None
+    assert "2 stations" in picture.markdown
+    assert table.table[0]["source"] == "station0"
+
+
+def test_a_file_with_several_scans_gives_several(tmp_path: Path) -> None:
+    """One without points stays among them, for `register` to leave out by name."""
+    head = "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+    path = tmp_path / "field.ptx"
+    path.write_text(head + "0 0 0 0.5\n" * 4 + head + "1 0 0 1\n0 1 0 1\n0 0 1 1\n5 5 5 1\n")
+    scans = ingest_scan.bare(store.current().put(path), "field", 1.0, None, None)
+    assert [(s.name, s.index) for s in scans] == [("field-1", 0), ("field-2", 1)]
+    with pytest.raises(BadInput, match="one position is stated for its 2 scans"):
+        ingest_scan.bare(store.current().put(path), "field", 1.0, (1.0, 2.0, 3.0), None)
+    with pytest.raises(BadInput, match=r"field-1.*field-2"):
+        register.bare(scans, RegistrationSettings())
+
+
+def test_unusable_file_is_refused_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "x.ply"
+    path.write_text("hello")
+    with pytest.raises(BadInput) as caught:
+        ingest_scan.bare(store.current().put(path), "east bank", 1.0, None, None)
+    assert caught.value.item == "east bank"

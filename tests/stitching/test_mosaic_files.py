@@ -1,0 +1,59 @@
+"""Tiled TIFFs: what is put in comes out, in any order, the same bytes, readable by others."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image
+
+from artifacts.mosaic import TILE_PX, MosaicWriter, TiledTiff
+from artifacts.raster import TiffWindows
+from artifacts.store import digest
+
+
+def test_windows_in_any_order_make_one_picture(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).integers(0, 255, (700, 900, 3)).astype(np.uint8)
+    corners = [(x, y) for y in range(0, 700, 2 * TILE_PX) for x in range(0, 900, 2 * TILE_PX)]
+    for name, order in (("a.tif", corners), ("b.tif", corners[::-1])):
+        with TiledTiff(tmp_path / name, 900, 700, 3, np.uint8, {"gsd_mm_px": 0.5}, 0.5) as out:
+            for x, y in order:
+                out.put(x, y, picture[y : y + 2 * TILE_PX, x : x + 2 * TILE_PX])
+    assert digest(tmp_path / "a.tif") == digest(tmp_path / "b.tif")
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.tif")), picture)
+    windows = TiffWindows(tmp_path / "a.tif", "a")
+    np.testing.assert_array_equal(windows.read(123, 456, 200, 890), picture[123:456, 200:890])
+    windows.close()
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        tags = file.pages.first.tags
+        across, per = tags["XResolution"].value
+        assert across / per == pytest.approx(20.0)  # pixels a centimetre at 0.5 mm
+        assert tags["Software"].value == "hairline"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.tif", "b.tif"]
+
+
+def test_what_never_came_is_blank(tmp_path: Path) -> None:
+    with MosaicWriter(tmp_path, 600, 600, None, (0.0, 0.0), "own plane") as out:
+        lit = np.full((88, 88), 255, np.uint8)
+        out.put(512, 512, np.dstack([lit] * 3), lit, np.full((88, 88), 3, np.uint16))
+    assert out.covered_px == 88 * 88
+    source = tifffile.imread(out.source)
+    assert source.dtype == np.uint16
+    assert int(source.sum()) == 3 * 88 * 88
+
+
+def test_a_failed_mosaic_leaves_nothing_behind(tmp_path: Path) -> None:
+    def interrupted() -> None:
+        with MosaicWriter(tmp_path, 600, 600, 1.0, (0.0, 0.0), "own plane"):
+            raise RuntimeError("stopped")
+
+    with pytest.raises(RuntimeError):
+        interrupted()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_window_off_the_tiles_is_refused(tmp_path: Path) -> None:
+    out = TiledTiff(tmp_path / "c.tif", 600, 600, 1, np.uint8, {})
+    with pytest.raises(ValueError, match="does not start on a tile"):
+        out.put(7, 0, np.zeros((10, 10), np.uint8))
+    out.close()
