@@ -5,6 +5,7 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
 Points = npt.NDArray[np.float64]  # (N, 2) x, y in pixels
+Mask = npt.NDArray[np.bool_]  # (H, W)
 
 SMOOTH_PX = 3.0  # σ along the line: takes the staircase of pixels out, leaves the wander of a crack in
 
@@ -21,15 +22,26 @@ def smooth(points: Points, sigma_px: float = SMOOTH_PX) -> Points:
     return resample(smoothed[reach : reach + len(even)], 1.0)
 
 
-def straight_ends(points: Points, cut_px: int) -> Points:
-    """The last pixels at each end replaced by as many straight on: a skeleton's end turns into a corner of
-    its mask."""
+def straight_ends(points: Points, cut_px: int, mask: Mask) -> Points:
+    """The last pixels at each end replaced by a straight line on to where the (H, W) mask ends: a skeleton's
+    end turns into a corner of its mask, or stops short of its end by as much as its width."""
     if cut_px < 1 or len(points) < 6 * cut_px:
         return points
     inner = points[cut_px:-cut_px]
-    steps = np.arange(1, cut_px + 1)[:, None]
     first, last = ((inner[a] - inner[b]) / (2 * cut_px) for a, b in ((0, 2 * cut_px), (-1, -1 - 2 * cut_px)))
-    return np.concatenate([inner[0] + steps[::-1] * first, inner, inner[-1] + steps * last])
+    before = _straight_on(inner[0], first, 3 * cut_px + 1, mask)[::-1]
+    return np.concatenate([before, inner, _straight_on(inner[-1], last, 3 * cut_px + 1, mask)])
+
+
+def _straight_on(
+    start: npt.NDArray[np.float64], step: npt.NDArray[np.float64], most: int, mask: Mask
+) -> Points:
+    """Steps from the start, at most so many, that stay within the mask."""
+    ahead = start + np.arange(1, most + 1)[:, None] * step
+    x, y = np.rint(ahead).astype(int).T
+    inside = (x >= 0) & (y >= 0) & (x < mask.shape[1]) & (y < mask.shape[0])
+    inside[inside] = mask[y[inside], x[inside]]
+    return ahead[: len(ahead) if inside.all() else int(inside.argmin())]
 
 
 def resample(points: Points, step_px: float) -> Points:

@@ -11,7 +11,7 @@ from schemas.raster import Progress, Raster
 from tasks.measurement.centreline import Points, arc_length, normals, orientation_deg, smooth, straight_ends
 from tasks.measurement.profiles import Across, across
 from tasks.measurement.psf import estimate_psf_px
-from tasks.measurement.skeleton import Mask, crack_paths
+from tasks.measurement.skeleton import Mask, Path, crack_paths
 from tasks.measurement.width_profile import Widths, measure_widths
 
 LEAST_HALF_PX, LARGEST_HALF_PX = 8.0, 60.0  # half length of a profile
@@ -60,7 +60,7 @@ def measure_cracks(
     lines, rejected = [], []
     paths = crack_paths(mask, least_px, gap_px)
     for n, path in enumerate(paths):
-        line = _line(raster, path.points, thickness, path.network)
+        line = _line(raster, path, mask, thickness)
         middle = path.points[len(path.points) // 2]
         position = (float(middle[0]), float(middle[1]))
         if line.profiles.usable.sum() < 3:
@@ -76,20 +76,20 @@ def measure_cracks(
     return MeasuredImage(sorted(cracks, key=lambda crack: crack.middle_px), rejected, psf_px)
 
 
-def _line(raster: Raster, path: Points, thickness: npt.NDArray[np.float32], network: int) -> _Line:
+def _line(raster: Raster, path: Path, mask: Mask, thickness: npt.NDArray[np.float32]) -> _Line:
     """Centreline through the darkest of the profiles, and the profiles across it."""
-    at = np.rint(path).astype(int)
+    at = np.rint(path.points).astype(int)
     inside = (at[:, 1] < thickness.shape[0]) & (at[:, 0] < thickness.shape[1])
     width = float(np.percentile(thickness[at[inside, 1], at[inside, 0]], 75))
     half = float(np.clip(1.0 * width + BESIDE_PX, LEAST_HALF_PX, LARGEST_HALF_PX))
-    centreline = smooth(straight_ends(path, round(width / 2)))
+    centreline = smooth(straight_ends(path.points, round(width / 2), mask))
     profiles = across(raster, centreline, half)
     near = np.abs(profiles.offsets_px) <= width / 2 + 2.0
     dark = np.maximum(profiles.darkness[:, near], 0.0)
     shift = (dark * profiles.offsets_px[near]).sum(axis=1) / np.maximum(dark.sum(axis=1), 1e-3)
     shift = gaussian_filter1d(np.where(profiles.usable, shift, 0.0), 3.0, mode="nearest")
     centreline = smooth(centreline + shift[:, None] * normals(centreline))
-    return _Line(centreline, across(raster, centreline, half), network)
+    return _Line(centreline, across(raster, centreline, half), path.network)
 
 
 def _peak(profiles: Across) -> npt.NDArray[np.float64]:

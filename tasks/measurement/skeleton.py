@@ -50,7 +50,8 @@ def skeleton_pixels(mask: Mask) -> Points:
     for label in range(1, len(stats)):
         x, y, width, height, _ = (int(n) for n in stats[label])
         patch = np.pad(labels[y : y + height, x : x + width] == label, 1)
-        rows, columns = np.nonzero(skeletonize(patch))  # type: ignore[no-untyped-call]
+        # Zhang's thinning, the default, eats up to 13 px of an end of an even diagonal stroke; Lee's does not
+        rows, columns = np.nonzero(skeletonize(patch, method="lee"))  # type: ignore[no-untyped-call]
         found.append(np.column_stack([columns + x - 1, rows + y - 1]).astype(np.float64))
     return np.concatenate(found)
 

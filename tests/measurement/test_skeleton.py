@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tasks.measurement.centreline import arc_length, orientation_deg, resample, simplify, smooth
@@ -21,6 +21,7 @@ def length(points: np.ndarray) -> float:
 
 @settings(deadline=None, max_examples=30)
 @given(st.floats(0, 2 * np.pi), st.floats(60, 130), st.integers(1, 7))
+@example(0.75, 60.0, 3)
 def test_length_of_a_stroke_in_any_direction(direction: float, half: float, thickness: int) -> None:
     ends = [
         (round(200 + s * half * np.cos(direction)), round(150 + s * half * np.sin(direction)))
