@@ -33,7 +33,7 @@ class Modelled:
 
 
 def has_scans(inspection: Inspection) -> bool:
-    return bool(inspection.scans) or bool(inspection.simulation and inspection.simulation.scene == "bridge")
+    return bool(inspection.scans) or bool(inspection.simulation and inspection.simulation.scene != "wall")
 
 
 def model(inspection: Inspection, base: Path) -> Modelled:

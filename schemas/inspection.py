@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from schemas.camera import Camera
 from schemas.contract import Contract, Matrix4, Vector3
 from schemas.geodesy import GeoOrigin
+from schemas.scanning import Scanning
 from schemas.settings import (
     AssessSettings,
     DetectSettings,
@@ -69,8 +70,9 @@ class PhotoSet(Contract):
 
 
 class SimulationInput(Contract):
-    scene: Literal["bridge", "wall"]
+    scene: Literal["bridge", "wall", "arch", "facade"]
     seed: int = 1
+    scanner: Scanning = Scanning()
 
 
 class Inspection(Contract):

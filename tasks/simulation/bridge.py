@@ -13,6 +13,7 @@ from tasks.simulation.concrete import concrete, plain
 from tasks.simulation.crack import CrackShape, branch, crack
 from tasks.simulation.face import Face, Placement
 from tasks.simulation.light import Daylight
+from tasks.simulation.plants import crown
 from tasks.simulation.scene import Scene
 from tasks.simulation.skin import Skin
 
@@ -128,16 +129,7 @@ def _surroundings(rng: np.random.Generator) -> tuple[Face, ...]:
     faces += PLACE.box("car-body", (1.0, 6.6, 0.25), (5.2, 8.3, 0.9), "wesntb", "metal")
     faces += PLACE.box("car-cabin", (1.9, 6.7, 0.9), (4.3, 8.2, 1.45), "wesnt", "metal")
     faces += PLACE.box("trunk", (-7.55, -11.05, 0.0), (-7.39, -10.89, 3.0), "wesn", "leaf")
-    crown = np.array([-7.5, -11.0, 4.2])
-    for k in range(260):
-        direction = rng.standard_normal(3)
-        centre = crown + 1.5 * rng.uniform(0.3, 1.0) * direction / np.linalg.norm(direction)
-        u = rng.standard_normal(3)
-        u /= np.linalg.norm(u)
-        v = np.cross(u, rng.standard_normal(3))
-        v /= np.linalg.norm(v)
-        corner = centre - 0.11 * (u + v)
-        faces.append(PLACE.face(f"leaf-{k}", corner, u, v, 0.22, 0.22, "leaf"))
+    faces += crown(PLACE, rng, (-7.5, -11.0, 4.2))
     return tuple(faces)
 
 

@@ -11,7 +11,7 @@ from schemas.plane import Plane
 from schemas.surface import Surface, in_plane_axes
 
 Array = npt.NDArray[np.float64]
-Material = Literal["concrete", "wood", "ground", "metal", "leaf"]
+Material = Literal["concrete", "wood", "ground", "metal", "leaf", "glass"]
 
 
 @dataclass(frozen=True)

@@ -6,64 +6,71 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter
 from scipy.spatial.transform import Rotation
 
 from schemas.contract import Vector3
-from tasks.simulation.face import Array, Face, vector
+from schemas.scanning import Scanning
+from tasks.simulation.face import Array, vector
+from tasks.simulation.scan_faults import astray_m, misread, mixed, range_error_m, returned
+from tasks.simulation.scan_target import NOTHING, ScanTarget
 from tasks.simulation.scene import Scene
+from tasks.simulation.traffic import met_faces
 
-STEP_DEG = 0.36  # between neighbouring rays, both ways
 LOWEST_DEG, HIGHEST_DEG = -55.0, 90.0
 RANGE_M = (0.6, 80.0)
-RANGE_SIGMA_M = 0.003
-ANGLE_SIGMA_DEG = 0.004
-STATION_SIGMA_M = 0.05  # of the measured position, each axis
-LEVEL_SIGMA_DEG = 0.02  # what the tripod's level leaves
-GROUND_RELIEF_M = 0.04
-GROUND_CELL_M = 1.0
+QUIET = Scanning()
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """One station's scan. points: (N, 3) float32 metres in the scanner's frame."""
+    """One station's scan. points: (N, 3) float32 metres in the scanner's frame. face: (N,) which face of the
+    scene each is of; scan_target.MIXED where the beam met two things, NOTHING for who passed by."""
 
     name: str
     points: npt.NDArray[np.float32]
+    face: npt.NDArray[np.int32]
     measured_m: Vector3
     T_world_scan: Array  # (4, 4) true
 
 
-def scan(scene: Scene, progress: Callable[[float], None]) -> Iterator[Sweep]:
+def scan(scene: Scene, progress: Callable[[float], None], scanning: Scanning = QUIET) -> Iterator[Sweep]:
     """Scan the scene from each of its stations; frames are levelled, their yaw is arbitrary."""
-    import open3d as o3d  # takes seconds to import
-
-    triangles = _mesh(scene)
-    caster = o3d.t.geometry.RaycastingScene(nthreads=1)
-    vertices = triangles.reshape(-1, 3).astype(np.float32)
-    indices = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
-    caster.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(indices))
+    azimuth, elevation = _angles(scanning.step_deg)
+    shape = azimuth.shape
+    azimuth, elevation = azimuth.ravel(), elevation.ravel()
+    directions = _towards(azimuth, elevation)
+    shown = _towards(*misread(azimuth, elevation, scanning))
+    off = astray_m(scanning, len(scene.stations_m), scene.seed)
+    moving = bool(scanning.people or scanning.cars or scanning.sway_m)
+    target = ScanTarget(scene.faces, scene.seed)
     for number, station in enumerate(scene.stations_m):
         rng = np.random.default_rng([scene.seed, 0x5363616E, number])
-        level = rng.normal(0.0, LEVEL_SIGMA_DEG, 2)
+        site = np.random.default_rng([scene.seed, 0x536974, number])
+        faces = scene.faces
+        if moving:
+            faces = met_faces(scene, scanning.people, scanning.cars, scanning.sway_m, site)
+            target = ScanTarget(faces, scene.seed)
+        level = rng.normal(0.0, scanning.level_sigma_deg, 2)
         R = Rotation.from_euler("ZXY", [rng.uniform(0.0, 360.0), *level], degrees=True).as_matrix()
-        directions = _directions()
-        rays = np.hstack([np.broadcast_to(station, directions.shape), directions @ R.T])
-        distance = (
-            caster.cast_rays(o3d.core.Tensor.from_numpy(rays.astype(np.float32)))["t_hit"]
-            .numpy()
-            .astype(float)
-        )
-        hit = (distance > RANGE_M[0]) & (distance < RANGE_M[1])
-        errors = np.radians(ANGLE_SIGMA_DEG) * rng.standard_normal((int(hit.sum()), 3))
-        aim = directions[hit] + np.cross(errors, directions[hit])
-        measured_range = distance[hit] + rng.normal(0.0, RANGE_SIGMA_M, len(aim))
+        rays = directions @ R.T
+        hits = target.cast(station, rays)
+        if scanning.beam_mrad:
+            hits = mixed(target, station, rays, hits, shape, scanning.beam_mrad)
+        hit = (hits.distance_m > RANGE_M[0]) & (hits.distance_m < RANGE_M[1])
+        hit &= returned(hits, faces, scanning.reach_m, site)
+        errors = np.radians(scanning.angle_sigma_deg) * rng.standard_normal((int(hit.sum()), 3))
+        aim = shown[hit] + np.cross(errors, shown[hit])
+        true_m = hits.distance_m[hit]
+        range_m = true_m + range_error_m(true_m, scanning) + rng.normal(0.0, scanning.range_sigma_m, len(aim))
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = R, station
+        measured = np.asarray(station) + rng.normal(0.0, scanning.station_sigma_m, 3) + off[number]
+        face = np.where(hits.face[hit] < len(scene.faces), hits.face[hit], NOTHING)
         yield Sweep(
             name=f"station-{number + 1}",
-            points=(aim * measured_range[:, None]).astype(np.float32),
-            measured_m=vector(np.asarray(station) + rng.normal(0.0, STATION_SIGMA_M, 3)),
+            points=(aim * range_m[:, None]).astype(np.float32),
+            face=face.astype(np.int32),
+            measured_m=vector(measured),
             T_world_scan=T,
         )
         progress((number + 1) / len(scene.stations_m))
@@ -78,29 +85,15 @@ def write_ply(points: npt.NDArray[np.float32], path: Path) -> None:
     path.write_bytes(header.encode("ascii") + np.ascontiguousarray(points, dtype="<f4").tobytes())
 
 
-def _directions() -> Array:
-    azimuth = np.radians(np.arange(0.0, 360.0, STEP_DEG))
-    elevation = np.radians(np.arange(LOWEST_DEG, HIGHEST_DEG, STEP_DEG))
-    a, e = (g.ravel() for g in np.meshgrid(azimuth, elevation))
+def _angles(step_deg: float) -> tuple[Array, Array]:
+    """(rows, columns) azimuths, clockwise from y, and elevations, radians."""
+    azimuth = np.radians(np.arange(0.0, 360.0, step_deg))
+    elevation = np.radians(np.arange(LOWEST_DEG, HIGHEST_DEG, step_deg))
+    a, e = np.meshgrid(azimuth, elevation)
+    return a, e
+
+
+def _towards(azimuth: Array, elevation: Array) -> Array:
+    """(N, 3) unit vectors in the scanner's frame."""
+    a, e = azimuth, elevation
     return np.column_stack([np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), np.sin(e)])
-
-
-def _mesh(scene: Scene) -> Array:
-    """(N, 3, 3) triangles: two a face; the ground as a fine grid with relief."""
-    flat = [f.corners_m[[[0, 1, 2], [0, 2, 3]]] for f in scene.faces if f.material != "ground"]
-    return np.concatenate([*flat, *(_relief(scene, f) for f in scene.faces if f.material == "ground")])
-
-
-def _relief(scene: Scene, ground: Face) -> Array:
-    """(N, 3, 3) triangles of uneven ground."""
-    rng = np.random.default_rng([scene.seed, 0x47726E64])
-    columns, rows = (round(side / GROUND_CELL_M) + 1 for side in (ground.width_m, ground.height_m))
-    bumps = gaussian_filter(rng.standard_normal((rows, columns)), 1.5)
-    v, u = np.mgrid[:rows, :columns] * GROUND_CELL_M
-    points = ground.to_world(np.column_stack([u.ravel(), v.ravel()]))
-    points += np.outer(bumps.ravel() / bumps.std() * GROUND_RELIEF_M, ground.normal)
-    grid = points.reshape(rows, columns, 3)
-    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-    lower = np.stack([a, b, c], axis=2).reshape(-1, 3, 3)
-    upper = np.stack([a, c, d], axis=2).reshape(-1, 3, 3)
-    return np.concatenate([lower, upper])

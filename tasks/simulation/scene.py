@@ -34,6 +34,7 @@ class Scene:
     camera: Camera  # as calibrated: what the inspection is told
     gsd_mm_px: float  # that the photos are planned for
     stations_m: tuple[Vector3, ...] = ()  # of the laser scanner
+    curved: tuple[str, ...] = ()  # parts whose faces, named part-…, are facets of one curved surface
     origin: GeoOrigin | None = None
     gain: float | None = None  # a locked exposure; None: automatic
 

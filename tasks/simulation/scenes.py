@@ -1,5 +1,6 @@
 """The scenes by name, and the inspection that is ready for each."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from threading import Lock
 from typing import Literal
@@ -7,10 +8,16 @@ from typing import Literal
 from schemas.inspection import CameraInput, Inspection, SimulationInput
 from schemas.settings import PlanSettings
 from schemas.vehicle import Vehicle
-from tasks.simulation import bridge, wall
+from tasks.simulation import arch, bridge, facade, wall
 from tasks.simulation.scene import Scene
 
 BRIDGE_SURFACES = ("wall-south-08", "soffit-02", "wall-east-01")
+SCENES: dict[str, Callable[[int], Scene]] = {
+    "bridge": bridge.bridge,
+    "wall": wall.wall,
+    "arch": arch.arch,
+    "facade": facade.facade,
+}
 VEHICLE = Vehicle(radius_m=0.4, clearance_m=1.0, position_bias_m=0.1, position_jitter_m=0.03)  # RTK
 
 
@@ -25,7 +32,7 @@ def build(simulation: SimulationInput) -> Scene:
 
 @lru_cache(maxsize=1)
 def _built(simulation: SimulationInput) -> Scene:
-    return bridge.bridge(simulation.seed) if simulation.scene == "bridge" else wall.wall(simulation.seed)
+    return SCENES[simulation.scene](simulation.seed)
 
 
 def ready_inspection(scene: Literal["bridge", "wall"]) -> Inspection:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tasks.simulation.bridge import INSPECTED, bridge
-from tasks.simulation.scanner import RANGE_SIGMA_M, STATION_SIGMA_M, Sweep, scan, write_ply
+from tasks.simulation.scanner import QUIET, Sweep, scan, write_ply
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_points_lie_on_the_true_faces_with_3_mm_noise_in_range(sweeps: list[Swee
             errors.append(w[on][slant > 0.3] / slant[slant > 0.3])
         along_ray = np.concatenate(errors)
         assert len(along_ray) > 3000, name
-        assert along_ray.std() == pytest.approx(RANGE_SIGMA_M, rel=0.1)
+        assert along_ray.std() == pytest.approx(QUIET.range_sigma_m, rel=0.1)
         assert abs(along_ray.mean()) < 0.0004
 
 
@@ -51,7 +51,7 @@ def test_frames_are_levelled_and_turned_at_will(sweeps: list[Sweep]) -> None:
 
 def test_stations_are_measured_5_cm_off(sweeps: list[Sweep]) -> None:
     off = np.array([np.subtract(s.measured_m, s.T_world_scan[:3, 3]) for s in sweeps])
-    assert 0.5 * STATION_SIGMA_M < off.std() < 1.6 * STATION_SIGMA_M
+    assert 0.5 * QUIET.station_sigma_m < off.std() < 1.6 * QUIET.station_sigma_m
 
 
 def test_the_same_seed_gives_the_same_scans(sweeps: list[Sweep]) -> None:
