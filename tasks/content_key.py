@@ -44,21 +44,31 @@ def digest_code(module: str) -> dict[str, str]:
     waiting, seen = [module], set(WITHOUT_INFLUENCE)
     while waiting:
         name = waiting.pop()
-        path = _source(name)
-        if name in seen or path is None:
+        if name in seen:
             continue
         seen.add(name)
-        tree = _without_docstrings(ast.parse(path.read_bytes()))
-        parts[path.relative_to(ROOT).as_posix()] = _sha(ast.dump(tree).encode())
-        for data in _data_files(tree):
-            file = path.parent / data
-            parts[file.relative_to(ROOT).as_posix()] = _sha(file.read_bytes())
-        for target in _imports(tree):
+        digests, targets = _module(name)
+        parts |= digests
+        for target in targets:
             if target.split(".")[0] in OURS:
                 waiting.append(target)
             else:
                 imported.add(target.split(".")[0])
     return dict(sorted(parts.items())) | _versions(imported)
+
+
+@cache
+def _module(name: str) -> tuple[Mapping[str, str], tuple[str, ...]]:
+    """The digests of a module of ours and of its data files, and what it imports; stages share most of them."""
+    path = _source(name)
+    if path is None:
+        return {}, ()
+    tree = _without_docstrings(ast.parse(path.read_bytes()))
+    digests = {path.relative_to(ROOT).as_posix(): _sha(ast.dump(tree).encode())}
+    for data in _data_files(tree):
+        file = path.parent / data
+        digests[file.relative_to(ROOT).as_posix()] = _sha(file.read_bytes())
+    return digests, tuple(_imports(tree))
 
 
 @cache

@@ -2,9 +2,8 @@
 
 import os
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from artifacts import report as report_pages
 from artifacts import store
 from artifacts.page import Page
 from schemas.crack import Measurement
@@ -21,10 +20,10 @@ from schemas.registered_model import RegisteredModel
 from schemas.settings import AssessSettings
 from schemas.structure import Structure
 from schemas.surface import Surface
-from tasks.assessment.evaluation import Mask
-from tasks.assessment.evaluation import evaluate as evaluate_masks
-from tasks.assessment.report import report as report_of
 from tasks.stage import stage
+
+if TYPE_CHECKING:
+    from tasks.assessment.evaluation import Mask
 
 
 def pages(inputs: Mapping[str, Any], result: CrackReport) -> list[Page]:
@@ -55,11 +54,15 @@ def assess(
     settings: AssessSettings,
 ) -> CrackReport:
     """The report's content: cracks classified, surfaces with their areas, and what was not inspected."""
+    from tasks.assessment.report import report as report_of
+
     return report_of(inspection, method, mosaics, measurements, patterns, surfaces, left_out, settings)
 
 
-def evaluate(method: str, pairs: Iterable[tuple[Mask, Mask]]) -> tuple[Evaluation, ...]:
+def evaluate(method: str, pairs: Iterable[tuple["Mask", "Mask"]]) -> tuple[Evaluation, ...]:
     """Agreement of (found, drawn) masks, each (H, W) bool; no stage: only the command line asks for it."""
+    from tasks.assessment.evaluation import evaluate as evaluate_masks
+
     return evaluate_masks(method, pairs)
 
 
@@ -83,9 +86,11 @@ def write_report(
     log: FlightLog | None,
 ) -> Folder:
     """index.html for people, cracks.csv and cracks.json for other programs."""
+    from artifacts.report import write_report as write_pages
+
     files = store.current()
     with files.scratch() as folder:
-        report_pages.write_report(
+        write_pages(
             folder,
             inspection=inspection,
             report=report,

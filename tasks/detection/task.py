@@ -15,7 +15,6 @@ from schemas.file import File
 from schemas.mosaic import Mosaic
 from schemas.problem import BadInput
 from schemas.settings import DetectSettings
-from tasks.detection.detect import baselines, detect_raster
 from tasks.stage import progress, stage
 
 
@@ -32,6 +31,8 @@ def detect(mosaic: Mosaic, patterns: Patterns, settings: DetectSettings) -> Dete
     """Crack pixels by the settings' method; with `baselines` the paper's global thresholds as well.
 
     The paper's own method looks at all of the image, markers included, and takes them out by t1 and t2."""
+    from tasks.detection.detect import baselines, detect_raster
+
     files = store.current()
     taken_out = None if settings.method == "paper" else files.path(patterns.mask)
     image, coverage = files.path(mosaic.image), files.path(mosaic.coverage)

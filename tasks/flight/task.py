@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from artifacts import store
 from artifacts.flight_log import MAVLINK, ORIGINAL, FlightArchive, about, messages
@@ -12,13 +12,11 @@ from schemas.flight_log import FlightLog
 from schemas.flight_plan import FlightPlan
 from schemas.mission import mission_items
 from schemas.problem import BadInput
-from tasks.flight.fly import Flight, FlightLost
-from tasks.flight.link import Link
-from tasks.flight.read_log import Kind, kind_of_log, read_log
-from tasks.flight.recording import Recording
-from tasks.flight.telemetry_log import read_frames
-from tasks.flight.track import compare_with_plan
 from tasks.stage import progress, stage
+
+if TYPE_CHECKING:
+    from tasks.flight.read_log import Kind
+    from tasks.flight.recording import Recording
 
 ARCHIVE = "flight.mcap"
 
@@ -55,6 +53,9 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
 
     mission: id of this flight; another id flies again. timeout_s: a vehicle silent for this long is lost.
     """
+    from tasks.flight.fly import Flight, FlightLost
+    from tasks.flight.link import Link
+
     items = mission_items(plan)
     with store.current().scratch() as folder, Link(connection, timeout_s) as link:
         flight = Flight(link, plan, items)
@@ -72,6 +73,8 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
 @stage(pages=flight_pages)
 def import_log(log: File, name: str, plan: FlightPlan | None) -> FlightLog:
     """Understand the log of an external flight (tlog, BIN, ulg, or an archived mcap)."""
+    from tasks.flight.read_log import kind_of_log
+
     path = store.current().path(log)
     kind = kind_of_log(path, name)
     with store.current().scratch() as folder:
@@ -84,6 +87,8 @@ def import_log(log: File, name: str, plan: FlightPlan | None) -> FlightLog:
 
 def convert(log: Path, out: Path) -> None:
     """Convert a flight log (tlog, BIN, ulg) to MCAP, whole. BadInput where it is none or damaged."""
+    from tasks.flight.read_log import kind_of_log
+
     kind = kind_of_log(log, log.name)
     if kind == "mcap":
         raise BadInput(log.name, "is an MCAP file already", "Use it as it is")
@@ -95,13 +100,18 @@ def convert(log: Path, out: Path) -> None:
         unfinished.unlink(missing_ok=True)
 
 
-def _converted(path: Path, kind: Kind, name: str, out: Path) -> Recording:
+def _converted(path: Path, kind: "Kind", name: str, out: Path) -> "Recording":
+    from tasks.flight.read_log import read_log
+
     with FlightArchive(out, {"log": kind}) as recorder:
         return read_log(path, kind, name, recorder)
 
 
-def _read_archive(path: Path, name: str, folder: Path) -> Recording:
+def _read_archive(path: Path, name: str, folder: Path) -> "Recording":
     """What an archive holds: its frames, or the original log inside it."""
+    from tasks.flight.read_log import read_log
+    from tasks.flight.telemetry_log import read_frames
+
     stated = about(path, name)
     kind = stated.get("log")
     if kind in ("dataflash", "ulog"):
@@ -114,7 +124,9 @@ def _read_archive(path: Path, name: str, folder: Path) -> Recording:
     return recording
 
 
-def _flight_log(recording: Recording, archive: File, plan: FlightPlan | None, name: str) -> FlightLog:
+def _flight_log(recording: "Recording", archive: File, plan: FlightPlan | None, name: str) -> FlightLog:
+    from tasks.flight.track import compare_with_plan
+
     found = compare_with_plan(recording, plan, name)
     return FlightLog(
         archive=archive,
@@ -136,7 +148,7 @@ def _about(vehicle: str, kind: str, plan: FlightPlan) -> dict[str, str]:
     }
 
 
-def _lost(connection: str, timeout_s: float, recording: Recording, archive: File) -> BadInput:
+def _lost(connection: str, timeout_s: float, recording: "Recording", archive: File) -> BadInput:
     flown_s = recording.fixes[-1].time_s - recording.fixes[0].time_s if recording.fixes else 0.0
     return BadInput(
         connection,

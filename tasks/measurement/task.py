@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from schemas.crack import Crack, Measurement
 from schemas.detection import Detection, Patterns
 from schemas.mosaic import Mosaic
 from schemas.settings import DetectSettings
-from tasks.measurement.in_the_world import crack_of
-from tasks.measurement.measure import MeasuredCrack, measure_cracks
 from tasks.stage import progress, stage
+
+if TYPE_CHECKING:
+    from tasks.measurement.measure import MeasuredCrack
 
 GAP_LENGTHS = 0.4  # a gap within a crack is bridged up to this share of the least length of a crack
 
@@ -38,6 +39,9 @@ def measure(
     mosaic: Mosaic, patterns: Patterns, detection: Detection, settings: DetectSettings
 ) -> Measurement:
     """Centreline, length, width profile and direction of every crack, each with its uncertainty."""
+    from tasks.measurement.in_the_world import crack_of
+    from tasks.measurement.measure import measure_cracks
+
     files = store.current()
     gsd = mosaic.gsd_mm_px
     least_px = settings.min_length_px if gsd is None else settings.min_length_mm / gsd
@@ -58,7 +62,7 @@ def measure(
     )
 
 
-def _photos(mosaic: Mosaic, source: Path, cracks: list[MeasuredCrack]) -> list[str | None]:
+def _photos(mosaic: Mosaic, source: Path, cracks: "list[MeasuredCrack]") -> list[str | None]:
     """The photo that each crack's middle comes from."""
     names: list[str | None] = []
     with closing(TiffWindows(source, mosaic.name)) as windows:

@@ -1,7 +1,7 @@
 """Stage: find the stitching markers and the blank areas, so that detection leaves them out."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from artifacts.raster import MosaicRaster, write_mask
 from schemas.detection import Patterns
 from schemas.mosaic import Mosaic
 from schemas.settings import PatternSettings
-from tasks.patterns.remove import Ring, remove
 from tasks.stage import progress, stage
+
+if TYPE_CHECKING:
+    from tasks.patterns.remove import Ring
 
 
 def pages(inputs: Mapping[str, Any], patterns: Patterns) -> list[Page]:
@@ -33,6 +35,8 @@ def pages(inputs: Mapping[str, Any], patterns: Patterns) -> list[Page]:
 @stage(pages=pages)
 def remove_patterns(mosaic: Mosaic, settings: PatternSettings) -> Patterns:
     """Blank by the coverage, off the surface by its outline, markers by their colour; the paper's peaks."""
+    from tasks.patterns.remove import remove
+
     files = store.current()
     with MosaicRaster(files.path(mosaic.image), files.path(mosaic.coverage), mosaic.name) as raster:
         found = remove(raster, _outline_px(mosaic), settings, progress)
@@ -49,7 +53,7 @@ def remove_patterns(mosaic: Mosaic, settings: PatternSettings) -> Patterns:
     )
 
 
-def _outline_px(mosaic: Mosaic) -> list[Ring] | None:
+def _outline_px(mosaic: Mosaic) -> "list[Ring] | None":
     """The surface's rings in mosaic pixels."""
     if mosaic.surface is None or mosaic.gsd_mm_px is None:
         return None

@@ -12,12 +12,6 @@ from schemas.flight_log import FlightLog
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput
 from schemas.settings import StitchSettings
-from tasks.photos.assignment import assign_shots
-from tasks.photos.intrinsics import camera_from_metadata, camera_of_photo
-from tasks.photos.metadata import read_metadata
-from tasks.photos.quality import exposure, sharpness
-from tasks.photos.reading import REMEDY, read_photo
-from tasks.photos.sift import detect_features, write_features
 from tasks.stage import stage
 
 
@@ -31,6 +25,11 @@ def ingest(
     position_sigma_m: float,
 ) -> Photo:
     """Decode, set upright, measure; camera from EXIF where none is given. Raises BadInput by name."""
+    from tasks.photos.intrinsics import camera_from_metadata, camera_of_photo
+    from tasks.photos.metadata import read_metadata
+    from tasks.photos.quality import exposure, sharpness
+    from tasks.photos.reading import read_photo
+
     decoded = read_photo(store.current().path(file), name)
     height_px, width_px = decoded.pixels.shape[:2]
     metadata = read_metadata(decoded.exif, decoded.xmp)
@@ -63,12 +62,17 @@ def ingest(
 @stage()
 def assign(names: tuple[str, ...], log: FlightLog) -> tuple[AssignedShot, ...]:
     """Which photo of a folder is which shot of the flight log."""
+    from tasks.photos.assignment import assign_shots
+
     return assign_shots(names, log)
 
 
 @stage()
 def features(photo: Photo, settings: StitchSettings) -> Features:
     """At most `settings.features` RootSIFT features."""
+    from tasks.photos.reading import REMEDY
+    from tasks.photos.sift import detect_features, write_features
+
     path = store.current().path(photo.file)
     grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
     if grey is None:

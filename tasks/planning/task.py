@@ -13,13 +13,12 @@ from schemas.geodesy import GeoOrigin
 from schemas.settings import PlanSettings
 from schemas.structure import Structure
 from schemas.vehicle import Vehicle
-from tasks.planning.occupied_points import read_points
-from tasks.planning.picture import draw_plan
-from tasks.planning.plan import plan
 from tasks.stage import progress, stage
 
 
 def pages(inputs: Mapping[str, Any], made: FlightPlan) -> list[Page]:
+    from tasks.planning.picture import draw_plan
+
     structure: Structure = inputs["structure"]
     lines = [
         "### Flight plan",
@@ -61,5 +60,8 @@ def plan_flight(
     settings: PlanSettings,
 ) -> FlightPlan:
     """Shooting points over the surfaces to inspect, a tour of them, a collision-free path, and its proof."""
+    from tasks.planning.occupied_points import read_points
+    from tasks.planning.plan import plan
+
     points = read_points(store.current().path(structure.occupied))
     return plan(structure, points, camera, vehicle, origin, home_m, settings, progress)

@@ -13,10 +13,6 @@ from schemas.problem import BadInput
 from schemas.registered_model import RegisteredModel
 from schemas.scan import Scan
 from schemas.settings import RegistrationSettings
-from tasks.registration.merged_model import write_model
-from tasks.registration.picture import draw_model
-from tasks.registration.read_scan import read_scan, scan_count, stated_unit_m
-from tasks.registration.register import register as register_scans
 from tasks.stage import progress, stage
 
 
@@ -30,6 +26,8 @@ def ingest_scan(
     unit_m: metres per unit of the file's coordinates; where it is 1 and the file itself states another
     (LAS, LAZ), the file's holds. BadInput where no scan of the file can be used.
     """
+    from tasks.registration.read_scan import read_scan, scan_count, stated_unit_m
+
     path = store.current().path(file)
     count = scan_count(path, name)
     if count > 1 and (station_position_m is not None or T_world_scan is not None):
@@ -65,6 +63,8 @@ def ingest_scan(
 
 
 def pages(inputs: Mapping[str, Any], model: RegisteredModel) -> list[Page]:
+    from tasks.registration.picture import draw_model
+
     points_m, station = cloud_sample(store.current().path(model.cloud))
     title = f"### {len(model.stations)} stations, {model.points:,} points"
     left_out = "".join(f"\n- left out: **{one.item}**, {one.what}" for one in model.left_out)
@@ -86,6 +86,9 @@ def pages(inputs: Mapping[str, Any], model: RegisteredModel) -> list[Page]:
 @stage(pages=pages)
 def register(scans: tuple[Scan, ...], settings: RegistrationSettings) -> RegisteredModel:
     """Tie the scans together in one world frame and merge them into one cloud."""
+    from tasks.registration.merged_model import write_model
+    from tasks.registration.register import register as register_scans
+
     here = store.current()
     found = register_scans([(scan, here.path(scan.file)) for scan in scans], settings, progress)
     low_m, high_m = found.model.points_m.min(axis=0), found.model.points_m.max(axis=0)

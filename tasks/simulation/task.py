@@ -1,7 +1,8 @@
 """The simulator's stages: scans, photos, truth and score. Only flows and tests call them."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any, Literal
 
 from artifacts import store
 from artifacts.page import Page
@@ -14,33 +15,18 @@ from schemas.mission import mission_items
 from schemas.problem import BadInput
 from schemas.scan import Scan
 from schemas.simulation import Score, Truth, WallPhotos
-from tasks.simulation import scanner
-from tasks.simulation.photography import Exposure, contact_sheet, take
-from tasks.simulation.scenes import build, ready_inspection
-from tasks.simulation.score import score as score_of
-from tasks.simulation.score_table import score_table
-from tasks.simulation.trajectory import fly_mission
-from tasks.simulation.truth import truth as truth_of
-from tasks.simulation.vehicle import start_vehicle
-from tasks.simulation.wall import WALL, wall_poses
 from tasks.stage import progress, stage
 
-SHOWN = 6  # photos on the contact sheet
+if TYPE_CHECKING:
+    from tasks.simulation.photography import Exposure
 
-__all__ = [
-    "demo_inspection",
-    "photograph",
-    "photograph_wall",
-    "score",
-    "score_table",
-    "simulate_scans",
-    "simulation_truth",
-    "start_vehicle",
-]
+SHOWN = 6  # photos on the contact sheet
 
 
 def demo_inspection(scene: str) -> Inspection:
     """The inspection of a built-in scene, ready to run."""
+    from tasks.simulation.scenes import ready_inspection
+
     return ready_inspection(_scene(scene))
 
 
@@ -57,6 +43,8 @@ def scan_pages(inputs: Mapping[str, Any], scans: tuple[Scan, ...]) -> list[Page]
 
 
 def photo_pages(inputs: Mapping[str, Any], photos: Folder | WallPhotos) -> list[Page]:
+    from tasks.simulation.photography import contact_sheet
+
     folder = photos.photos if isinstance(photos, WallPhotos) else photos
     title = f"### {len(folder.entries)} photos"
     shown = folder.entries[:: max(len(folder.entries) // SHOWN, 1)][:SHOWN]
@@ -73,10 +61,13 @@ def score_pages(inputs: Mapping[str, Any], result: Score) -> list[Page]:
 @stage(pages=scan_pages)
 def simulate_scans(simulation: SimulationInput) -> tuple[Scan, ...]:
     """Laser scans of the scene, each in its scanner's frame, with the station's position as measured."""
+    from tasks.simulation import scanner
+    from tasks.simulation.scenes import build
+
     shelf = store.current()
     scans = []
     with shelf.scratch() as folder:
-        for sweep in scanner.scan(build(simulation), progress):
+        for sweep in scanner.scan(build(simulation), progress, simulation.scanner):
             path = folder / f"{sweep.name}.ply"
             scanner.write_ply(sweep.points, path)
             scans.append(Scan(name=sweep.name, file=shelf.put(path), station_position_m=sweep.measured_m))
@@ -86,6 +77,9 @@ def simulate_scans(simulation: SimulationInput) -> tuple[Scan, ...]:
 @stage(pages=photo_pages)
 def photograph(simulation: SimulationInput, plan: FlightPlan, surface: str) -> Folder:
     """Photos NAME.jpg of one surface's shooting points, from where the vehicle truly was."""
+    from tasks.simulation.photography import Exposure
+    from tasks.simulation.trajectory import fly_mission
+
     flown = fly_mission(mission_items(plan), plan.origin, plan.home_m, plan.vehicle, simulation.seed)
     wanted = {point.photo for point in plan.shooting_points if point.surface == surface}
     exposures = [
@@ -99,6 +93,10 @@ def photograph(simulation: SimulationInput, plan: FlightPlan, surface: str) -> F
 @stage(pages=photo_pages)
 def photograph_wall(simulation: SimulationInput) -> WallPhotos:
     """The paper's wall, photographed by hand from places measured to 5 cm and 1°."""
+    from tasks.simulation.photography import Exposure
+    from tasks.simulation.scenes import build
+    from tasks.simulation.wall import WALL, wall_poses
+
     poses = wall_poses(simulation.seed)
     photos = _taken(simulation, [Exposure(name, true) for name, true, _ in poses])
     scene = build(simulation)
@@ -110,7 +108,10 @@ def photograph_wall(simulation: SimulationInput) -> WallPhotos:
     )
 
 
-def _taken(simulation: SimulationInput, exposures: list[Exposure]) -> Folder:
+def _taken(simulation: SimulationInput, exposures: "list[Exposure]") -> Folder:
+    from tasks.simulation.photography import take
+    from tasks.simulation.scenes import build
+
     shelf = store.current()
     with shelf.scratch() as folder:
         take(build(simulation), exposures, folder, progress)
@@ -120,6 +121,9 @@ def _taken(simulation: SimulationInput, exposures: list[Exposure]) -> Folder:
 @stage()
 def simulation_truth(simulation: SimulationInput) -> File:
     """truth.json: cracks, markers, surfaces and stations as they are (schemas.simulation.Truth)."""
+    from tasks.simulation.scenes import build
+    from tasks.simulation.truth import truth as truth_of
+
     shelf = store.current()
     with shelf.scratch() as folder:
         path = folder / "truth.json"
@@ -130,7 +134,23 @@ def simulation_truth(simulation: SimulationInput) -> File:
 @stage(pages=score_pages)
 def score(report: CrackReport, truth: File) -> Score:
     """The report against the truth: cracks found, false cracks, errors of width and length."""
+    from tasks.simulation.score import score as score_of
+
     return score_of(report, Truth.model_validate_json(store.current().path(truth).read_text()))
+
+
+def score_table(result: Score) -> str:
+    """A score as text for a terminal."""
+    from tasks.simulation.score_table import score_table as table_of
+
+    return table_of(result)
+
+
+def start_vehicle(plan: FlightPlan, seed: int) -> AbstractContextManager[str]:
+    """A simulated vehicle in a process of its own, for as long as the context lasts; its URL."""
+    from tasks.simulation.vehicle import start_vehicle as start
+
+    return start(plan, seed)
 
 
 def _scene(name: str) -> Literal["bridge", "wall"]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -18,11 +18,12 @@ from schemas.problem import BadInput, LeftOut
 from schemas.settings import StitchSettings
 from schemas.surface import Surface
 from tasks.stage import progress, stage
-from tasks.stitching.compositing import Pixels, Tile
-from tasks.stitching.mosaicking import Registered, blend_photos, register_photos
-from tasks.stitching.pairs import PhotoFeatures
-from tasks.stitching.undistortion import undistorted_tile
-from tasks.stitching.view import Array
+
+if TYPE_CHECKING:
+    from tasks.stitching.compositing import Pixels, Tile
+    from tasks.stitching.mosaicking import Registered
+    from tasks.stitching.pairs import PhotoFeatures
+    from tasks.stitching.view import Array
 
 REMEDY = {
     "blurred": "Shoot it again, slower or with a shorter exposure",
@@ -64,6 +65,8 @@ def stitch(
     settings: StitchSettings,
 ) -> Mosaic:
     """One mosaic of all photos of a surface; every photo is solved, placed or rejected with a reason."""
+    from tasks.stitching.mosaicking import blend_photos, register_photos
+
     if not photos:
         raise BadInput(name, "has no photo", "Give it photos, or leave it out")
     described = {f.photo: f for f in features}
@@ -98,6 +101,8 @@ def stitch(
 @stage(pages=pages)
 def single(photo: Photo, gsd_mm_px: float | None) -> Mosaic:
     """A photo that stands for itself: undistorted, one placement; unaltered where the lens is ideal."""
+    from tasks.stitching.undistortion import undistorted_tile
+
     identity: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     return _written(
         [undistorted_tile(_reader([photo])(0), photo.camera)],
@@ -115,15 +120,18 @@ def single(photo: Photo, gsd_mm_px: float | None) -> Mosaic:
     )
 
 
-def _features(features: Features) -> PhotoFeatures:
+def _features(features: Features) -> "PhotoFeatures":
+    from tasks.stitching.pairs import PhotoFeatures
+
     with np.load(store.current().path(features.file)) as arrays:
         return PhotoFeatures(arrays["xy"], arrays["scale"], arrays["response"], arrays["descriptors"])
 
 
-def _reader(photos: list[Photo]) -> Callable[[int], Pixels]:
+def _reader(photos: list[Photo]) -> Callable[[int], "Pixels"]:
+
     paths: list[Path] = [store.current().path(p.file) for p in photos]  # verified here, read from threads
 
-    def read(index: int) -> Pixels:
+    def read(index: int) -> "Pixels":
         bgr = cv2.imread(str(paths[index]), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
         if bgr is None:
             raise BadInput(photos[index].name, "cannot be read", "Copy it again from the camera's card")
@@ -132,7 +140,7 @@ def _reader(photos: list[Photo]) -> Callable[[int], Pixels]:
     return read
 
 
-def _placement(registered: Registered, index: int, gain: float) -> PhotoPlacement:
+def _placement(registered: "Registered", index: int, gain: float) -> PhotoPlacement:
     fate, solved = registered.fates[index], registered.solved
     H = None if fate.view is None else _matrix(registered.canvas.H_mosaic_plane @ fate.view.H_plane_photo)
     return PhotoPlacement(
@@ -146,12 +154,12 @@ def _placement(registered: Registered, index: int, gain: float) -> PhotoPlacemen
     )
 
 
-def _matrix(H: Array) -> Matrix3:
+def _matrix(H: "Array") -> Matrix3:
     a, b, c = (tuple(float(x) for x in row) for row in H / H[2, 2])
     return (a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])
 
 
-def _as_adjusted(registered: Registered, index: int) -> Photo:
+def _as_adjusted(registered: "Registered", index: int) -> Photo:
     view = registered.fates[index].view
     photo = registered.photos[index]
     return photo if view is None else photo.model_copy(update={"camera": view.camera})
@@ -162,7 +170,7 @@ def _remedy(reason: str) -> str:
     return next(told, "Check that it shows this surface, or shoot it again with more overlap")
 
 
-def _written(tiles: Iterable[Tile], **known: Any) -> Mosaic:
+def _written(tiles: Iterable["Tile"], **known: Any) -> Mosaic:
     """The mosaic with its three files in the store."""
     with store.current().scratch() as folder:
         frame = f"surface {known['surface'].name}" if known["surface"] else "own plane"

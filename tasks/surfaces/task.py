@@ -12,12 +12,11 @@ from schemas.registered_model import RegisteredModel
 from schemas.settings import SurfaceSettings
 from schemas.structure import Structure
 from tasks.stage import progress, stage
-from tasks.surfaces.cloud import read_cloud, write_points
-from tasks.surfaces.extraction import extract_structure
-from tasks.surfaces.picture import draw_structure
 
 
 def pages(inputs: Mapping[str, Any], structure: Structure) -> list[Page]:
+    from tasks.surfaces.picture import draw_structure
+
     title = f"### {len(structure.surfaces)} surfaces, {len(structure.obstacles)} obstacles"
     picture = markdown_of(draw_structure(structure), "surfaces in colour, from above and from below")
     rows = [
@@ -38,6 +37,10 @@ def pages(inputs: Mapping[str, Any], structure: Structure) -> list[Page]:
 @stage(pages=pages)
 def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
     """Planes with their outlines, obstacles, and every point that a vehicle must not meet."""
+    from tasks.surfaces.cloud import read_cloud, write_points
+    from tasks.surfaces.extraction import extract_structure
+    from tasks.surfaces.scanners import scanners
+
     shelf = store.current()
     stations_m = np.array([[row[3] for row in station.T_world_scan[:3]] for station in model.stations])
     item = "model of " + ", ".join(station.name for station in model.stations)
@@ -52,5 +55,6 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
         occupied=occupied,
         min_m=model.min_m,
         max_m=model.max_m,
+        stations_m=tuple((float(e), float(n), float(u)) for e, n, u in scanners(cloud, stations_m)),
         left_out=model.left_out,
     )
