@@ -36,17 +36,46 @@ class SurfaceCoverage(Contract):
     not_reached: tuple[str, ...] = ()  # reasons, in words, for what is not covered
 
 
+class Flight(Contract):
+    """One battery's part of a plan: from home through some of its waypoints and back home."""
+
+    first: int  # number of its first waypoint in the plan, from 0
+    last: int  # of its last
+    photos: int
+    length_m: float
+    duration_s: float  # from take-off to landing
+    battery: float  # share of the vehicle's endurance
+
+
 class FlightPlan(Contract):
     camera: Camera
     vehicle: Vehicle
     origin: GeoOrigin
     home_m: Vector3  # on the ground, where the vehicle takes off and lands
-    waypoints: tuple[Waypoint, ...]  # from take-off to landing, home itself not among them
+    waypoints: tuple[Waypoint, ...]  # from take-off to landing, flight by flight, home itself not among them
     coverage: tuple[SurfaceCoverage, ...]
     length_m: float
     duration_s: float
     overlap: float  # used along both axes, widened for the position error
+    flights: tuple[Flight, ...] = ()  # in order; none: a plan of one flight
     left_out: tuple[LeftOut, ...] = ()
+
+    @property
+    def each_flight(self) -> "tuple[FlightPlan, ...]":
+        """The plan's flights as plans of one flight each, all of them from and to the same home."""
+        if len(self.flights) < 2:
+            return (self,)
+        return tuple(
+            self.model_copy(
+                update={
+                    "waypoints": self.waypoints[flight.first : flight.last + 1],
+                    "flights": (),
+                    "length_m": flight.length_m,
+                    "duration_s": flight.duration_s,
+                }
+            )
+            for flight in self.flights
+        )
 
     @property
     def shooting_points(self) -> tuple[Waypoint, ...]:

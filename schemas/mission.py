@@ -6,8 +6,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from schemas.contract import Contract, Vector3
 from schemas.flight_plan import FlightPlan
+from schemas.problem import BadInput
 
 MOUNT_MODE_TARGETING = float(mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING)
+MOST_ITEMS = 650  # ArduPilot answers MAV_MISSION_NO_SPACE to more
 GIMBAL_RATE_DEG_S = 30.0  # slow end of what drone gimbals do
 
 
@@ -29,13 +31,17 @@ class MissionItem(Contract):
 
 
 def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
-    """The mission of a plan: home, take-off, each waypoint, landing at home.
+    """The mission of a plan of one flight: home, take-off, each waypoint, landing at home.
+
+    Raises BadInput for a plan of several flights, and for more items than a vehicle takes.
 
     ArduPilot starts the commands that follow a waypoint when it leaves it, and turns the nose along the path
     on every new leg. So gimbal and yaw of a waypoint are commanded on the way to it, and a shooting point is
     a waypoint with a hold (longer where the turn takes longer than the leg), then CONDITION_YAW once more,
     which holds the trigger behind it back until the nose is within 2°.
     """
+    if len(plan.flights) > 1:
+        raise BadInput("plan", f"it has {len(plan.flights)} flights", "Name the one to fly.")
     items: list[MissionItem] = []
 
     def add(
@@ -84,6 +90,12 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
         facing = waypoint.kind == "shooting"
         here, yaw_deg = waypoint.position_m, waypoint.yaw_deg
     add(mavlink.MAV_CMD_NAV_LAND, plan.home_m)
+    if len(items) > MOST_ITEMS:
+        raise BadInput(
+            "plan",
+            f"its mission has {len(items)} items, and a vehicle takes at most {MOST_ITEMS}",
+            "Plan again: the flights are split so that each fits.",
+        )
     return tuple(items)
 
 

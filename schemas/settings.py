@@ -1,10 +1,12 @@
 """Every setting of every stage, its default explained on its line."""
 
+import math
 from typing import Literal
 
 from pydantic import Field
 
-from schemas.contract import Contract
+from schemas.box import Box
+from schemas.contract import Contract, Vector2
 
 
 class RegistrationSettings(Contract):
@@ -26,7 +28,8 @@ class SurfaceSettings(Contract):
 
 class PlanSettings(Contract):
     smallest_crack_mm: float = Field(default=0.3, gt=0)  # to be detected; its width is one GSD
-    gsd_mm_px: float | None = Field(default=None, gt=0)  # None: from smallest_crack_mm
+    smallest_measured_mm: float | None = Field(default=None, gt=0)  # to be measured; three GSD wide
+    gsd_mm_px: float | None = Field(default=None, gt=0)  # None: from the smallest cracks
     overlap: float = Field(default=0.6, ge=0.1, lt=0.95)  # between neighbours, both axes, before widening
     max_incidence_deg: float = Field(default=45.0, gt=0, lt=80)  # more oblique views are not counted
     voxel_m: float = Field(default=0.25, gt=0)  # occupancy grid
@@ -36,6 +39,20 @@ class PlanSettings(Contract):
     surfaces: tuple[str, ...] | None = None  # names to inspect; None: all but the ground
     min_altitude_m: float = Field(default=0.5, ge=0)  # above the ground, scanned or inferred from around it
     max_altitude_m: float = Field(default=120.0, gt=0)  # above the ground
+    water_m: float | None = None  # level of a river or the sea, which scanners do not see
+    scanner_reach_m: float = Field(default=40.0, gt=0)  # without an echo, free air is taken for known to here
+    free_m: tuple[
+        Box, ...
+    ] = ()  # {low_m: [e, n, u], high_m: […]}: no scanner saw it, the crew vouches for it
+    no_fly_m: tuple[Box, ...] = ()  # boxes never to enter, as free_m
+    fence_m: tuple[Vector2, ...] | None = Field(default=None, min_length=3)  # corners [e, n] never to leave
+
+    @property
+    def asked_gsd_mm_px(self) -> float:
+        """The ground sample distance of the request: to detect a crack takes its width, to measure it a third."""
+        if self.gsd_mm_px is not None:
+            return self.gsd_mm_px
+        return min(self.smallest_crack_mm, (self.smallest_measured_mm or math.inf) / 3)
 
 
 class FlightSettings(Contract):

@@ -13,4 +13,5 @@ class Structure(Contract):
     occupied: File  # PLY, float32 metres: every point that a vehicle must not meet, voxelised
     min_m: Vector3  # extent of the scanned world
     max_m: Vector3
+    stations_m: tuple[Vector3, ...] = ()  # where scanners stood; none where that is not known
     left_out: tuple[LeftOut, ...] = ()

@@ -6,6 +6,8 @@ from pydantic import Field
 
 from schemas.contract import Contract
 
+BOUND_3D = 2.795  # 95 % quantile of the length of a normal 3D vector, σ = 1 along each axis
+
 
 class Vehicle(Contract):
     radius_m: float = Field(default=0.4, gt=0)  # half the largest diagonal, propellers included
@@ -23,10 +25,21 @@ class Vehicle(Contract):
 
     @property
     def position_error_m(self) -> float:
-        """95 % bound of the position error along any axis: two σ of its slow and quick part together."""
+        """95 % bound of the position error's length in 3D, its slow and quick part together."""
+        return BOUND_3D * math.hypot(self.position_bias_m, self.position_jitter_m)
+
+    @property
+    def sideways_error_m(self) -> float:
+        """95 % bound of the position error along any one axis: two σ of its slow and quick part together."""
         return 2.0 * math.hypot(self.position_bias_m, self.position_jitter_m)
 
     @property
     def inflation_m(self) -> float:
         """How far the planned centre of the vehicle stays from every scanned point."""
         return self.radius_m + self.clearance_m + self.position_error_m
+
+    @property
+    def margin_m(self) -> float:
+        """How far the planned centre stays from space that it may not enter but that nothing was seen in:
+        a fence, a no-fly box, what no scanner saw. The vehicle stays out of it whole, wherever it errs."""
+        return self.radius_m + self.position_error_m

@@ -38,10 +38,11 @@ class Ground:
         return np.column_stack([xy, self.height_m.ravel()]), scanned
 
 
-def ground_under(points_m: Array) -> Ground:
+def ground_under(points_m: Array, water_m: float | None = None) -> Ground:
     """Ground of (N, 3) points: the lowest point of each column, opened (erosion, then dilation) so that
     whatever is narrower than 25 m and stands higher than its surroundings drops out. It never lies above
-    the lowest point of a column, so nothing scanned as free air is taken for ground."""
+    the lowest point of a column, so nothing scanned as free air is taken for ground, but never below the
+    water's level where one is given: water returns no echo."""
     low = points_m[:, :2].min(axis=0)
     shape = np.floor((points_m[:, :2].max(axis=0) - low) / CELL_M).astype(int) + 1
     column = np.floor((points_m[:, :2] - low) / CELL_M).astype(int)
@@ -50,4 +51,5 @@ def ground_under(points_m: Array) -> Ground:
     nearest = ndimage.distance_transform_edt(np.isinf(lowest), return_distances=False, return_indices=True)
     filled = lowest[tuple(nearest)]
     opened = ndimage.grey_opening(filled, size=int(WIDEST_OBJECT_M / CELL_M), mode="nearest")
-    return Ground(low_m=low, height_m=np.minimum(opened, filled), lowest_m=lowest)
+    height = np.minimum(opened, filled)
+    return Ground(low, height if water_m is None else np.maximum(height, water_m), lowest)

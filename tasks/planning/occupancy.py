@@ -83,5 +83,10 @@ def voxel_grid(airspace: Airspace, low_m: Array, high_m: Array, voxel_m: float) 
     xy = np.stack(np.meshgrid(*(low_m[a] + np.arange(shape[a]) * voxel_m for a in (0, 1)), indexing="ij"), -1)
     altitude = (low_m[2] + np.arange(shape[2]) * voxel_m) - airspace.ground.at(xy)[..., None]
     free &= (altitude >= airspace.min_altitude_m + voxel_m / 2) & (altitude <= airspace.max_altitude_m)
+    if airspace.allowed is not None:
+        for i in range(shape[0]):  # plane by plane: a place a cell takes a hundred bytes
+            columns = np.stack(np.meshgrid(*(np.arange(n) for n in shape[1:]), indexing="ij"), -1).reshape(-1, 2)
+            places = low_m + np.column_stack([np.full(len(columns), i), columns]) * voxel_m
+            free[i] &= (airspace.allowed.slack_m(places) >= half_diagonal).reshape(shape[1:])
     component, _ = ndimage.label(free)  # face neighbours: a step that cuts no corner leaves none of them
     return VoxelGrid(low_m=low_m, voxel_m=voxel_m, free=free, component=component)

@@ -54,25 +54,36 @@ def check_camera(camera: Camera) -> None:
         )
 
 
-def check_stand_off(gsd_mm_px: float, camera: Camera, vehicle: Vehicle) -> None:
-    """Refuse a ground sample distance whose stand-off leaves no clearance or no usable footprint."""
-    stand_off = camera.stand_off_m(gsd_mm_px)
+def planned_stand_off_m(gsd_mm_px: float, camera: Camera, vehicle: Vehicle) -> float:
+    """The stand-off to fly: closer than the asked ground sample distance needs, by the position error, since
+    the photos are judged at stand-off plus error.
+
+    Refuses a ground sample distance whose stand-off less the error leaves no clearance, or one whose photos
+    are smaller than what the position jitters."""
+    error = vehicle.position_error_m
+    farthest = camera.stand_off_m(gsd_mm_px)
+    stand_off = farthest - error
     if stand_off < vehicle.inflation_m + ROOM_M:
-        safe = np.ceil(camera.gsd_mm_px(vehicle.inflation_m + ROOM_M) * 1000) / 1000
-        longer = np.ceil((vehicle.inflation_m + ROOM_M) * 1000 / gsd_mm_px)
+        needed = vehicle.inflation_m + ROOM_M + error
+        safe = np.ceil(camera.gsd_mm_px(needed) * 1000) / 1000
+        longer = np.ceil(needed * 1000 / gsd_mm_px)
         raise BadInput(
             "plan.gsd_mm_px",
-            f"{gsd_mm_px:g} mm/px puts this camera {stand_off:.2f} m from the surface, but the vehicle must"
-            f" stay {vehicle.inflation_m:.2f} m away (radius {vehicle.radius_m:g}, clearance"
-            f" {vehicle.clearance_m:g}, position error {vehicle.position_error_m:.2f})",
+            f"{gsd_mm_px:g} mm/px takes this camera at most {farthest:.2f} m from the surface, so it is planned"
+            f" {max(stand_off, 0.0):.2f} m away and may come {error:.2f} m closer (position error), but the"
+            f" vehicle must stay {vehicle.radius_m + vehicle.clearance_m:.2f} m away (radius"
+            f" {vehicle.radius_m:g}, clearance {vehicle.clearance_m:g})",
             f"Ask for {safe:g} mm/px or coarser, take a lens of at least {longer:.0f} px focal length, or"
-            " lower the clearance or the position error (RTK).",
+            " lower vehicle.clearance_m or the position error (RTK).",
         )
     footprint = min(camera.footprint_m(stand_off))
     if footprint < 3 * vehicle.position_jitter_m:
+        wide_m = 3 * vehicle.position_jitter_m * camera.focal_px / min(camera.width_px, camera.height_px)
+        enough = np.ceil(camera.gsd_mm_px(wide_m + error) * 1000) / 1000
         raise BadInput(
             "vehicle.position_jitter_m",
             f"a photo covers {footprint:.2f} m, less than three times the jitter of"
             f" {vehicle.position_jitter_m:g} m: neighbours would miss each other",
-            "Ask for a coarser plan.gsd_mm_px, take a camera with more pixels, or position by RTK.",
+            f"Ask for {enough:g} mm/px or coarser, take a camera with more pixels, or position by RTK.",
         )
+    return stand_off

@@ -62,21 +62,28 @@ def _blocked_neighbours(places: Array, airspace: Airspace) -> npt.NDArray[np.boo
     return blocked
 
 
-def legs(
-    stops: list[Stop], grid: VoxelGrid, airspace: Airspace, weights: tuple[float, float, float]
-) -> list[Array]:
-    """For each stop and the next (the last goes back to the first): the path (P, 3) with both ends."""
-    starts = np.array([s.place_m for s in stops])
-    straight = airspace.segments_free(starts, np.roll(starts, -1, axis=0))
-    finder = PathFinder(grid.free, weights)
-    paths = []
-    for k, (stop, direct) in enumerate(zip(stops, straight, strict=True)):
-        goal = stops[(k + 1) % len(stops)]
-        if direct:  # what the search would find and the smoothing make of it
-            paths.append(np.array([stop.place_m, goal.place_m]))
-            continue
-        found = finder.path(stop.entrance, goal.entrance)
-        assert found is not None, "both entrances lie in one component"
-        path = np.vstack([stop.place_m, grid.centres_m(found[0]), goal.place_m])
-        paths.append(shortcut(path, airspace))
-    return paths
+class Ways:
+    """Ways between stops: straight where that is free, else found by A* and smoothed."""
+
+    def __init__(self, grid: VoxelGrid, airspace: Airspace, weights: tuple[float, float, float]) -> None:
+        self._grid, self._airspace = grid, airspace
+        self._finder = PathFinder(grid.free, weights)
+
+    def between(self, start: Stop, goal: Stop) -> Array:
+        """(P, 3) from start to goal, both included."""
+        return self.along([start, goal])[0]
+
+    def along(self, stops: list[Stop]) -> list[Array]:
+        """For each stop but the last: the path (P, 3) to the next, both ends included."""
+        places = np.array([s.place_m for s in stops])
+        straight = self._airspace.segments_free(places[:-1], places[1:])
+        paths = []
+        for start, goal, direct in zip(stops, stops[1:], straight, strict=False):
+            if direct:  # what the search would find and the smoothing make of it
+                paths.append(np.array([start.place_m, goal.place_m]))
+                continue
+            found = self._finder.path(start.entrance, goal.entrance)
+            assert found is not None, "both entrances lie in one component"
+            path = np.vstack([start.place_m, self._grid.centres_m(found[0]), goal.place_m])
+            paths.append(shortcut(path, self._airspace))
+        return paths

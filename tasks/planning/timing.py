@@ -1,5 +1,6 @@
 """How long a flight takes: the vehicle cruises from stop to stop, turns, holds and shoots."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,8 @@ from schemas.flight_plan import Waypoint
 from schemas.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
+
+SLOW_BELOW_M, LANDING_M_S = 10.0, 0.5  # as ArduCopter lands
 
 
 def travel_s(distance_m: npt.ArrayLike, vehicle: Vehicle) -> Array:
@@ -31,14 +34,34 @@ def path_length_m(home_m: Vector3, waypoints: Sequence[Waypoint]) -> float:
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
+def path_s(path_m: Array, vehicle: Vehicle) -> float:
+    """Seconds along the corners (P, 3) of a path, a full stop at each."""
+    return float(travel_s(np.linalg.norm(np.diff(path_m, axis=0), axis=1), vehicle).sum())
+
+
+def shooting_s(turn: float, on_the_way: float, vehicle: Vehicle, camera: Camera) -> float:
+    """Seconds at a shooting point: settling, longer where the turn outlasts the way there, in whole seconds
+    as missions hold, and never shorter than the camera's interval."""
+    hold = math.ceil(vehicle.hold_s + max(0.0, turn - on_the_way))
+    return max(float(hold), 1.0 / camera.max_rate_hz)
+
+
+def landing_s(height_m: float) -> float:
+    """What landing takes longer than flying down: the last metres are slow."""
+    return min(max(height_m, 0.0), SLOW_BELOW_M) / LANDING_M_S
+
+
 def duration_s(home_m: Vector3, waypoints: Sequence[Waypoint], vehicle: Vehicle, camera: Camera) -> float:
     """Flight time from take-off to landing at home, a full stop at every waypoint."""
     places = np.array([home_m, *(w.position_m for w in waypoints), home_m])
-    seconds = float(travel_s(np.linalg.norm(np.diff(places, axis=0), axis=1), vehicle).sum())
+    travel = travel_s(np.linalg.norm(np.diff(places, axis=0), axis=1), vehicle)
+    seconds = float(travel.sum())
     yaw = waypoints[0].yaw_deg if waypoints else 0.0
-    for waypoint in waypoints:
+    on_the_way = 0.0
+    for waypoint, leg in zip(waypoints, travel, strict=False):
+        on_the_way += float(leg)
         if waypoint.kind == "shooting":
-            seconds += float(turn_s(yaw, waypoint.yaw_deg, vehicle))
-            seconds += max(vehicle.hold_s, 1.0 / camera.max_rate_hz)
-            yaw = waypoint.yaw_deg
-    return seconds
+            turn = float(turn_s(yaw, waypoint.yaw_deg, vehicle))
+            seconds += shooting_s(turn, on_the_way, vehicle, camera)
+            yaw, on_the_way = waypoint.yaw_deg, 0.0
+    return seconds + (landing_s(waypoints[-1].position_m[2] - home_m[2]) if waypoints else 0.0)

@@ -14,7 +14,8 @@ from schemas.problem import BadInput
 from schemas.settings import PlanSettings
 from schemas.surface import Surface
 from schemas.vehicle import Vehicle
-from tasks.planning.airspace import Airspace, Block
+from tasks.planning.airspace import Airspace
+from tasks.planning.allowed import Block
 from tasks.planning.sight import Scene, outline_of
 
 Array = npt.NDArray[np.float64]
@@ -24,6 +25,10 @@ MOST_PHOTOS = 20_000  # of one surface
 MOST_WIDENED = 0.8  # overlap is not widened beyond this: photos grow with 1 / (1 − overlap)²
 RING_DEG = 5.0  # step of the oblique views that are tried
 VERTICAL_DEG = 5.0  # a view this close to straight up or down is flown as straight up or down
+
+UNSEEN = "in or beside air that no scanner saw and plan.free_m does not state"
+OUTSIDE = "outside the fence or too near to it"
+NO_FLY = "in a no-fly box or too near to it"
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,7 @@ class Views:
     stand_off_m: float
     views: tuple[View, ...]
     refused: Counter[str]  # reason -> number of shooting points
+    wanted_m: Array  # (N, 3) where a photo would be taken from if nothing forbade it
 
     @property
     def reached(self) -> float:
@@ -137,7 +143,7 @@ def shooting_points(
     """Shooting points of one surface. Each looks perpendicularly where it can; where the gimbal, an obstacle
     or the height limits forbid that, from the least oblique free place that sees the same target."""
     footprint = camera.footprint_m(stand_off_m)
-    places, uv = shooting_grid(surface, footprint, overlap, vehicle.position_error_m)
+    places, uv = shooting_grid(surface, footprint, overlap, vehicle.sideways_error_m)
     targets = surface.to_world(uv)
     right = surface.R_world_surface[:, :2] @ grid_turn(surface)[:, 0]
     seen_at = surface.to_world(_nearest_inside(surface, uv))
@@ -163,7 +169,8 @@ def shooting_points(
                 chosen[int(i)] = View(surface.name, row, column, targets[i], pose, math.degrees(incidence))
         left = left[reasons != ""]
     views = tuple(chosen[i] for i in sorted(chosen))
-    return Views(stand_off_m, views, Counter(str(refused[i]) for i in left))
+    wanted = targets + stand_off_m * np.asarray(surface.plane.normal)
+    return Views(stand_off_m, views, Counter(str(refused[i]) for i in left), wanted)
 
 
 def _nearest_inside(surface: Surface, uv: Array) -> Array:
@@ -203,6 +210,9 @@ def _reasons(
         Block.NEAR: f"closer than {airspace.inflation_m:.2f} m to something",
         Block.LOW: f"lower than {airspace.min_altitude_m:g} m above the ground",
         Block.HIGH: f"higher than {airspace.max_altitude_m:g} m above the ground",
+        Block.UNKNOWN: UNSEEN,
+        Block.FENCE: OUTSIDE,
+        Block.NO_FLY: NO_FLY,
     }
     reasons = np.array([words[Block(b)] for b in airspace.blocks(positions)], dtype=object)
     free = np.flatnonzero(reasons == "")

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from schemas.box import Box
 from schemas.camera import Camera
 from schemas.contract import Vector3
 from schemas.file import File
@@ -20,6 +21,7 @@ CAMERA = Camera(width_px=1632, height_px=1224, focal_px=4000.0)  # 1 mm/px at 4 
 VEHICLE = Vehicle(position_bias_m=0.1, position_jitter_m=0.03)
 ORIGIN = GeoOrigin(latitude_deg=50.0, longitude_deg=10.0, altitude_m=300.0)
 SPACING_M = 0.1
+OPEN = Box(low_m=(-200.0, -200.0, -20.0), high_m=(200.0, 200.0, 150.0))  # air that somebody vouches for
 
 
 def rectangle(

@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from tasks.planning.airspace import STEP_M, Airspace, Block
+from tasks.planning.airspace import STEP_M, Airspace
+from tasks.planning.allowed import Block
 from tests.planning.structures import box, wall
 
 

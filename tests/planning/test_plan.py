@@ -9,13 +9,14 @@ from scipy.spatial import cKDTree
 
 from schemas.contract import Vector3
 from schemas.flight_plan import FlightPlan
+from schemas.mission import MOST_ITEMS, mission_items
 from schemas.problem import BadInput
 from schemas.settings import PlanSettings
 from schemas.vehicle import Vehicle
 from tasks.planning.plan import plan
-from tests.planning.structures import CAMERA, ORIGIN, VEHICLE, World, box, bridge, rectangle, wall
+from tests.planning.structures import CAMERA, OPEN, ORIGIN, VEHICLE, World, box, bridge, rectangle, wall
 
-SETTINGS = PlanSettings(gsd_mm_px=1.0, overlap=0.5)
+SETTINGS = PlanSettings(gsd_mm_px=1.0, overlap=0.5, free_m=(OPEN,))
 OF_THE_DEMO = SETTINGS.model_copy(update={"surfaces": ("web-01", "pier-01", "soffit-01")})
 
 
@@ -48,7 +49,8 @@ def of_the_demo() -> FlightPlan:
 def test_the_demo_bridge_is_seen_whole_with_few_photos(of_the_demo: FlightPlan) -> None:
     assert {c.surface for c in of_the_demo.coverage} == {"web-01", "pier-01", "soffit-01"}
     assert all(c.covered >= 0.995 for c in of_the_demo.coverage)
-    assert all(c.gsd_mm_px == pytest.approx(1.0) for c in of_the_demo.coverage)
+    farthest_m = of_the_demo.coverage[0].stand_off_m + VEHICLE.position_error_m
+    assert CAMERA.gsd_mm_px(farthest_m) == pytest.approx(1.0)
     assert len(of_the_demo.shooting_points) <= 120
     assert not of_the_demo.left_out
 
@@ -123,9 +125,34 @@ def test_a_surface_that_cannot_be_reached_is_left_out_and_said() -> None:
     assert hidden.not_reached
 
 
-def test_a_flight_longer_than_a_battery_is_said() -> None:
-    made = planned(wall(), vehicle=VEHICLE.model_copy(update={"endurance_s": 60.0}))
-    assert [item.item for item in made.left_out] == ["battery"]
+def test_a_tour_longer_than_a_battery_becomes_flights_that_go_on_where_the_last_stopped() -> None:
+    whole = planned(wall())
+    made = planned(wall(), vehicle=VEHICLE.model_copy(update={"endurance_s": 120.0}))
+    assert len(made.flights) > 1
+    assert [w.photo for w in made.shooting_points] == [w.photo for w in whole.shooting_points]
+    assert sum(f.photos for f in made.flights) == len(made.shooting_points)
+    assert all(f.duration_s <= 120.0 * (1 - VEHICLE.reserve) for f in made.flights)
+    assert all(f.battery == pytest.approx(f.duration_s / 120.0, abs=1e-3) for f in made.flights)
+    assert [f.first for f in made.flights[1:]] == [f.last + 1 for f in made.flights[:-1]]
+    for flight in made.each_flight:
+        assert flight.waypoints[0].position_m[:2] == made.home_m[:2]
+        assert flight.waypoints[-1].position_m == flight.waypoints[0].position_m
+        assert nearest_m(flight, wall().cloud) >= VEHICLE.inflation_m
+        assert len(mission_items(flight)) <= MOST_ITEMS
+    with pytest.raises(BadInput, match="flights"):
+        mission_items(made)
+
+
+def test_a_mission_longer_than_a_vehicle_takes_is_split() -> None:
+    world = wall(24.0, 6.0, bottom=2.0)
+    made = planned(world, SETTINGS.model_copy(update={"overlap": 0.7}), VEHICLE.model_copy(update={"endurance_s": 1e5}))
+    assert len(made.flights) > 1
+    assert all(len(mission_items(flight)) <= MOST_ITEMS for flight in made.each_flight)
+
+
+def test_a_battery_that_does_not_reach_is_refused() -> None:
+    problem = refusal(wall(), endurance_s=30.0)
+    assert problem.item == "vehicle.endurance_s"
 
 
 def refusal(world: World, **changed: object) -> BadInput:

@@ -14,7 +14,7 @@ from schemas.settings import PlanSettings
 from schemas.structure import Structure
 from tasks.planning.occupied_points import read_points
 from tasks.planning.task import pages, plan_flight
-from tests.planning.structures import CAMERA, ORIGIN, VEHICLE, wall
+from tests.planning.structures import CAMERA, OPEN, ORIGIN, VEHICLE, wall
 
 
 def stored(structure: Structure, points: np.ndarray) -> Structure:
@@ -29,7 +29,7 @@ def test_the_stage_plans_from_the_store_and_draws_it() -> None:
     world = wall()
     with store.temporary():
         structure = stored(world.structure, world.cloud)
-        made = plan_flight.bare(structure, CAMERA, VEHICLE, ORIGIN, None, PlanSettings(gsd_mm_px=1.0))
+        made = plan_flight.bare(structure, CAMERA, VEHICLE, ORIGIN, None, PlanSettings(gsd_mm_px=1.0, free_m=(OPEN,)))
     assert made.coverage[0].covered >= 0.995
     shown, table = pages({"structure": structure}, made)
     assert len(table.table) == len(made.waypoints)

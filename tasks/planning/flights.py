@@ -1,0 +1,116 @@
+"""A tour cut into flights: each fits a battery with its reserve and the vehicle's memory, begins and ends at
+home, and goes on where the one before stopped."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from schemas.camera import Camera
+from schemas.contract import Vector3
+from schemas.flight_plan import Waypoint
+from schemas.mission import MOST_ITEMS
+from schemas.vehicle import Vehicle
+from tasks.planning.route import Stop, Ways
+from tasks.planning.timing import landing_s, path_s, shooting_s, turn_s
+from tasks.planning.viewpoints import View
+
+Array = npt.NDArray[np.float64]
+
+ITEMS_AROUND = 4  # home, take-off, the way back and the landing
+MOST_ITEMS_A_SHOT = 5  # gimbal, yaw, waypoint, yaw, trigger
+ITEMS_A_CORNER = 2
+
+
+class TooFar(Exception):
+    """A shooting point from which no battery leads home. number: its place in the tour, from 1."""
+
+    def __init__(self, number: int, seconds: float) -> None:
+        super().__init__(number, seconds)
+        self.number, self.seconds = number, seconds
+
+
+class _Home:
+    """Ways and seconds from a shooting point back home, each found once."""
+
+    def __init__(self, stops: list[Stop], ways: Ways, vehicle: Vehicle) -> None:
+        self._stops, self._ways, self._vehicle = stops, ways, vehicle
+        self._known: dict[int, Array] = {}
+
+    def way(self, number: int) -> Array:
+        if number not in self._known:
+            self._known[number] = self._ways.between(self._stops[number], self._stops[0])
+        return self._known[number]
+
+    def seconds(self, number: int, limit_s: float) -> float:
+        """The straight way's, where even that takes longer than the limit."""
+        straight = path_s(np.array([self._stops[number].place_m, self._stops[0].place_m]), self._vehicle)
+        return straight if straight > limit_s else path_s(self.way(number), self._vehicle)
+
+
+def flights(
+    stops: list[Stop], ways: Ways, home_m: Vector3, vehicle: Vehicle, camera: Camera
+) -> list[tuple[range, list[Array]]]:
+    """For each flight the stops that it visits (home is stop 0) and its paths, from above home and back.
+
+    Raises TooFar where a battery does not reach a stop and back."""
+    usable = vehicle.endurance_s * (1 - vehicle.reserve)
+    between = ways.along(stops[1:])
+    home = _Home(stops, ways, vehicle)
+    up_and_down = 2 * path_s(np.array([home_m, stops[0].place_m]), vehicle)
+    up_and_down += landing_s(float(stops[0].place_m[2]) - home_m[2])
+    made = []
+    first = 1
+    while first < len(stops):
+        seconds = up_and_down + path_s(home.way(first), vehicle) + shooting_s(0.0, 0.0, vehicle, camera)
+        items = ITEMS_AROUND + MOST_ITEMS_A_SHOT + ITEMS_A_CORNER * (len(home.way(first)) - 1)
+        back = home.seconds(first, usable - seconds)
+        if seconds + back > usable:
+            raise TooFar(first, seconds + back)
+        last = first
+        while last + 1 < len(stops):
+            path = between[last - 1]
+            travel = path_s(path, vehicle)
+            turn = float(turn_s(stops[last].yaw_deg, stops[last + 1].yaw_deg, vehicle))
+            longer = seconds + travel + shooting_s(turn, travel, vehicle, camera)
+            more = items + MOST_ITEMS_A_SHOT + ITEMS_A_CORNER * (len(path) - 2)
+            if longer + home.seconds(last + 1, usable - longer) > usable:
+                break
+            if more + ITEMS_A_CORNER * (len(home.way(last + 1)) - 1) > MOST_ITEMS:
+                break
+            seconds, items, last = longer, more, last + 1
+        made.append(
+            (range(first, last + 1), [home.way(first)[::-1], *between[first - 1 : last - 1], home.way(last)])
+        )
+        first = last + 1
+    return made
+
+
+def waypoints_along(paths: Sequence[Array], views: Sequence[View], taken: Counter[str]) -> list[Waypoint]:
+    """Waypoints from above home through every shooting point back to above home. `taken` counts the photos
+    of each surface through all flights; they are named in order."""
+    waypoints: list[Waypoint] = []
+    for path, view in zip(paths, [*views, None], strict=True):
+        yaw = view.pose.yaw_deg if view else (waypoints[-1].yaw_deg if waypoints else 0.0)
+        between = path[:-1] if not waypoints else path[1:-1]
+        waypoints += [Waypoint(kind="intermediate", position_m=_rounded(p), yaw_deg=yaw) for p in between]
+        if view is None:
+            waypoints.append(Waypoint(kind="intermediate", position_m=_rounded(path[-1]), yaw_deg=yaw))
+            break
+        taken[view.surface] += 1
+        waypoints.append(
+            Waypoint(
+                kind="shooting",
+                position_m=view.pose.position_m,
+                yaw_deg=yaw,
+                pitch_deg=view.pose.pitch_deg,
+                surface=view.surface,
+                photo=f"{view.surface}-{taken[view.surface]:04d}",
+            )
+        )
+    return waypoints
+
+
+def _rounded(place: Array) -> Vector3:
+    return round(float(place[0]), 4), round(float(place[1]), 4), round(float(place[2]), 4)
