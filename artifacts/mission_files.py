@@ -11,7 +11,10 @@ from typing import Any
 
 from pydantic import Field, JsonValue
 
-from schemas.contract import Contract, Vector3
+from artifacts.dji_mission import write_dji
+from artifacts.map_files import write_csv, write_kml
+from schemas.box import Box
+from schemas.contract import Contract, Vector2, Vector3
 from schemas.flight_plan import FlightPlan
 from schemas.mission import MissionItem, mission_items
 from schemas.problem import BadInput
@@ -41,14 +44,52 @@ class Mission(Contract):
     rally_points: dict[str, JsonValue] = Field(default={"points": [], "version": 2})
 
 
+def write_missions(plan: FlightPlan, stem: Path) -> None:
+    """STEM.waypoints (Mission Planner), .plan (QGroundControl), .kmz (DJI), .kml and .csv of one flight."""
+    write_waypoints(plan, stem.with_name(f"{stem.name}.waypoints"))
+    write_plan(plan, stem.with_name(f"{stem.name}.plan"))
+    write_dji(plan, stem.with_name(f"{stem.name}.kmz"))
+    write_kml(plan, stem.with_name(f"{stem.name}.kml"))
+    write_csv(plan, stem.with_name(f"{stem.name}.csv"))
+
+
 def mission_of(plan: FlightPlan) -> Mission:
+    """The mission of a plan of one flight, its fence and no-fly boxes, and home to rally to."""
     speed = plan.vehicle.speed_m_s
+    fences: list[JsonValue] = []
+    if plan.fence_m:
+        fences.append({"inclusion": True, "polygon": _ring(plan, plan.fence_m), "version": 1})
+    for box in _not_flown_over(plan):
+        fences.append({"inclusion": False, "polygon": _ring(plan, _corners(box)), "version": 1})
+    above_home = plan.waypoints[0].position_m if plan.waypoints else plan.home_m
+    latitude, longitude, _ = plan.origin.to_geographic(above_home)
+    rally = [round(latitude, 9), round(longitude, 9), round(above_home[2] - plan.home_m[2], 2)]
     return Mission(
+        fences={"circles": [], "polygons": fences, "version": 2},
+        rally_points={"points": [rally], "version": 2},
         home=plan.origin.to_geographic(plan.home_m),
         items=mission_items(plan)[1:],
         speed_m_s=speed,
         cruise_speed_m_s=speed,
     )
+
+
+def _not_flown_over(plan: FlightPlan) -> list[Box]:
+    """The no-fly boxes that no leg passes over or under: a ground station's fence has all heights."""
+    import shapely
+
+    path = shapely.LineString([plan.home_m[:2], *(w.position_m[:2] for w in plan.waypoints), plan.home_m[:2]])
+    return [box for box in plan.no_fly_m if not path.intersects(shapely.Polygon(_corners(box)))]
+
+
+def _corners(box: Box) -> tuple[Vector2, ...]:
+    (west, south, _), (east, north, _) = box.low_m, box.high_m
+    return ((west, south), (east, south), (east, north), (west, north))
+
+
+def _ring(plan: FlightPlan, corners_m: tuple[Vector2, ...]) -> list[JsonValue]:
+    places = (plan.origin.to_geographic((east, north, 0.0)) for east, north in corners_m)
+    return [[round(latitude, 9), round(longitude, 9)] for latitude, longitude, _ in places]
 
 
 def write_waypoints(mission: Mission | FlightPlan, path: Path) -> None:

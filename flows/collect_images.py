@@ -14,7 +14,7 @@ from flows.opening import opened
 from flows.workers import one_a_core
 from schemas.camera import Camera, CameraPose
 from schemas.file import File
-from schemas.flight_log import FlightLog
+from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
 from schemas.geodesy import GeoOrigin
 from schemas.inspection import Inspection, PhotoSet, SimulationInput
@@ -107,15 +107,29 @@ def collect(
 
 
 def _flown(inspection: Inspection, planned: FlightPlan) -> FlightLog:
+    """Each flight of the plan in turn; batteries are changed between them."""
+    legs = planned.each_flight
     if inspection.flight == "vehicle":
         if inspection.connection is None:
             raise BadInput("connection", "missing for 'flight: vehicle'", "Give it, as udpin:0.0.0.0:14550")
-        return fly(planned, inspection.mission, inspection.connection, 30.0)
-    if run.current().dry or fly.is_cached(planned, inspection.mission, "", 30.0):
-        return fly(planned, inspection.mission, "", 30.0)
+        return joined(
+            [fly(leg, _mission(inspection, n), inspection.connection, 30.0) for n, leg in enumerate(legs)]
+        )
+    if run.current().dry or all(
+        fly.is_cached(leg, _mission(inspection, n), "", 30.0) for n, leg in enumerate(legs)
+    ):
+        return joined([fly(leg, _mission(inspection, n), "", 30.0) for n, leg in enumerate(legs)])
     seed = inspection.simulation.seed if inspection.simulation else 1
-    with start_vehicle(planned, seed) as connection:
-        return fly(planned, inspection.mission, connection, 30.0)
+    logs = []
+    for n, leg in enumerate(legs):
+        with start_vehicle(leg, seed + n) as connection:
+            logs.append(fly(leg, _mission(inspection, n), connection, 30.0))
+    return joined(logs)
+
+
+def _mission(inspection: Inspection, number: int) -> str:
+    """The id that a flight of the plan is flown once under."""
+    return inspection.mission if number == 0 else f"{inspection.mission} flight {number + 1}"
 
 
 def _missed(log: FlightLog) -> tuple[LeftOut, ...]:

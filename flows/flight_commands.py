@@ -20,7 +20,15 @@ if TYPE_CHECKING:
 
 
 @app.command
-def fly(plan: Path, *, connection: str, out: OutFolder, mission: str = "1", timeout_s: float = 30.0) -> None:
+def fly(
+    plan: Path,
+    *,
+    connection: str,
+    out: OutFolder,
+    mission: str = "1",
+    flight: int = 1,
+    timeout_s: float = 30.0,
+) -> None:
     """Upload a plan to a vehicle over MAVLink, fly it, archive it: D/flight.mcap, D/track.json.
 
     Parameters
@@ -33,6 +41,8 @@ def fly(plan: Path, *, connection: str, out: OutFolder, mission: str = "1", time
         Folder to write to.
     mission:
         Id of this flight.
+    flight:
+        Which of the plan's flights, from 1: one battery each.
     timeout_s:
         A vehicle silent for this long is lost, seconds.
     """
@@ -40,11 +50,15 @@ def fly(plan: Path, *, connection: str, out: OutFolder, mission: str = "1", time
     from schemas.flight_plan import FlightPlan
     from tasks.flight.task import fly as fly_plan
 
-    planned = read_contract(plan, FlightPlan)
+    flights = read_contract(plan, FlightPlan).each_flight
+    if not 1 <= flight <= len(flights):
+        raise BadInput("--flight", f"there is no flight {flight}", f"The plan has {len(flights)}")
+    planned = flights[flight - 1]
     with working(out):
         log = fly_plan.bare(planned, mission, connection, timeout_s)
         write_flight(out, log, copy=True)
-    say(f"{len(log.shots)} photos in {log.duration_s / 60:.1f} min: {out / 'flight.mcap'}")
+    of = f"flight {flight} of {len(flights)}: " if len(flights) > 1 else ""
+    say(f"{of}{len(log.shots)} photos in {log.duration_s / 60:.1f} min: {out / 'flight.mcap'}")
     if log.missed:
         err.print(
             f"[yellow]Warning: {len(log.missed)} planned photos were not shot, first {log.missed[0]}[/yellow]"

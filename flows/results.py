@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from artifacts.mission_files import write_plan, write_waypoints
+from artifacts.mission_files import write_missions
 from artifacts.run_folder import lay_out
 from schemas.detection import Detection, Patterns
 from schemas.file import Folder
@@ -55,14 +55,20 @@ def write_structure(folder: Path, structure: Structure, copy: bool = False) -> N
 
 
 def write_flight_plan(folder: Path, plan: FlightPlan) -> None:
+    """plan.json and the mission files, one of each kind a flight: mission.*, mission-2.*, …"""
     write_json(folder / "plan.json", plan)
-    write_waypoints(plan, folder / "mission.waypoints")
-    write_plan(plan, folder / "mission.plan")
+    names = [f"mission-{n}" if n > 1 else "mission" for n in range(1, len(plan.each_flight) + 1)]
+    for name, flight in zip(names, plan.each_flight, strict=True):
+        write_missions(flight, folder / name)
+    for stale in folder.glob("mission-*.*"):
+        if stale.stem not in names:
+            stale.unlink()
 
 
 def write_flight(folder: Path, log: FlightLog, copy: bool = False) -> None:
-    write_json(folder / "track.json", log.model_dump(mode="json", exclude={"archive"}))
-    lay_out(folder, {f"flight{log.archive.suffix}": log.archive}, copy=copy)
+    write_json(folder / "track.json", log.model_dump(mode="json", exclude={"archive", "later_archives"}))
+    later = {f"flight-{n}{file.suffix}": file for n, file in enumerate(log.later_archives, start=2)}
+    lay_out(folder, {f"flight{log.archive.suffix}": log.archive, **later}, copy=copy)
 
 
 def write_mosaic(folder: Path, mosaic: Mosaic, copy: bool = False) -> None:

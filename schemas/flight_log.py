@@ -1,5 +1,7 @@
 """The flown flight: its archive, its track and its shots."""
 
+from collections.abc import Sequence
+
 from schemas.camera import CameraPose
 from schemas.contract import Contract, Vector3
 from schemas.file import File
@@ -37,3 +39,33 @@ class FlightLog(Contract):
     shots: tuple[Shot, ...]
     errors: tuple[TrackError, ...]
     missed: tuple[str, ...] = ()  # planned photos that the log has no shot of
+    later_archives: tuple[File, ...] = ()  # of the plan's second and further flights
+
+
+def joined(logs: Sequence[FlightLog]) -> FlightLog:
+    """The flights of one plan as one log, in their order; times go on from flight to flight."""
+    if len(logs) == 1:
+        return logs[0]
+    starts_s = [sum(log.duration_s for log in logs[:k]) for k in range(len(logs))]
+    return FlightLog(
+        archive=logs[0].archive,
+        vehicle=logs[0].vehicle,
+        duration_s=round(sum(log.duration_s for log in logs), 3),
+        track=tuple(
+            point.model_copy(update={"time_s": round(start + point.time_s, 3)})
+            for start, log in zip(starts_s, logs, strict=True)
+            for point in log.track
+        ),
+        shots=tuple(
+            shot.model_copy(update={"time_s": round(start + shot.time_s, 3)})
+            for start, log in zip(starts_s, logs, strict=True)
+            for shot in log.shots
+        ),
+        errors=tuple(
+            error.model_copy(update={"what": f"flight {number}: {error.what}"})
+            for number, log in enumerate(logs, start=1)
+            for error in log.errors
+        ),
+        missed=tuple(photo for log in logs for photo in log.missed),
+        later_archives=tuple(log.archive for log in logs[1:]),
+    )

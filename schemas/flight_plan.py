@@ -2,8 +2,9 @@
 
 from typing import Literal
 
+from schemas.box import Box
 from schemas.camera import Camera, CameraPose
-from schemas.contract import Contract, Vector3
+from schemas.contract import Contract, Vector2, Vector3
 from schemas.geodesy import GeoOrigin
 from schemas.problem import LeftOut
 from schemas.vehicle import Vehicle
@@ -57,6 +58,8 @@ class FlightPlan(Contract):
     length_m: float
     duration_s: float
     overlap: float  # used along both axes, widened for the position error
+    fence_m: tuple[Vector2, ...] | None = None  # corners [e, n] that the flights stay inside of
+    no_fly_m: tuple[Box, ...] = ()  # that they stay outside of
     flights: tuple[Flight, ...] = ()  # in order; none: a plan of one flight
     left_out: tuple[LeftOut, ...] = ()
 

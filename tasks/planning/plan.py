@@ -150,6 +150,8 @@ def plan(
         length_m=round(sum(flight.length_m for flight in flown), 3),
         duration_s=round(sum(flight.duration_s for flight in flown), 2),
         overlap=round(overlap, 4),
+        fence_m=settings.fence_m,
+        no_fly_m=settings.no_fly_m,
         flights=tuple(flown),
         left_out=left_out(coverage),
     )

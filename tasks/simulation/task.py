@@ -80,11 +80,15 @@ def photograph(simulation: SimulationInput, plan: FlightPlan, surface: str) -> F
     from tasks.simulation.photography import Exposure
     from tasks.simulation.trajectory import fly_mission
 
-    flown = fly_mission(mission_items(plan), plan.origin, plan.home_m, plan.vehicle, simulation.seed)
+    flown = [
+        fly_mission(mission_items(flight), plan.origin, plan.home_m, plan.vehicle, simulation.seed + number)
+        for number, flight in enumerate(plan.each_flight)
+    ]
     wanted = {point.photo for point in plan.shooting_points if point.surface == surface}
     exposures = [
         Exposure(shot.photo, shot.true_pose, shot.velocity_m_s, shot.time_s, shot.estimated_pose)
-        for shot in flown.shots
+        for flight in flown
+        for shot in flight.shots
         if shot.photo is not None and shot.photo in wanted
     ]
     return _taken(simulation, exposures)

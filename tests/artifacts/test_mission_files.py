@@ -1,7 +1,10 @@
 """Mission files against themselves, against the samples of two ground stations, and against bad ones."""
 
+import csv
 import json
 from pathlib import Path
+from xml.etree import ElementTree
+from zipfile import ZipFile
 
 import pytest
 from hypothesis import given, settings
@@ -13,9 +16,11 @@ from artifacts.mission_files import (
     mission_of,
     read_plan,
     read_waypoints,
+    write_missions,
     write_plan,
     write_waypoints,
 )
+from schemas.box import Box
 from schemas.camera import Camera
 from schemas.flight_plan import FlightPlan, Waypoint
 from schemas.geodesy import GeoOrigin
@@ -55,6 +60,74 @@ def test_a_plan_comes_back_item_by_item(write, read, name: str, tmp_path: Path) 
     for item, written in zip(back.items, items, strict=True):
         assert item == written.model_copy(update={"photo": None})
     assert back.home == pytest.approx(ORIGIN.to_geographic(plan.home_m), abs=1e-7)
+
+
+WPML = {"k": "http://www.opengis.net/kml/2.2", "w": "http://www.dji.com/wpmz/1.0.2"}
+
+
+def test_the_dji_mission_carries_every_waypoint_and_its_photo(tmp_path: Path) -> None:
+    plan = a_plan()
+    write_missions(plan, tmp_path / "mission")
+    with ZipFile(tmp_path / "mission.kmz") as archive:
+        assert archive.namelist() == ["wpmz/template.kml", "wpmz/waylines.wpml"]
+        template, waylines = (ElementTree.fromstring(archive.read(name)) for name in archive.namelist())
+    for root in (template, waylines):
+        placemarks = root.findall(".//k:Placemark", WPML)
+        assert len(placemarks) == len(plan.waypoints)
+        for placemark, waypoint in zip(placemarks, plan.waypoints, strict=True):
+            longitude, latitude = map(float, placemark.findtext(".//k:coordinates", "", WPML).split(","))
+            expected = plan.origin.to_geographic(waypoint.position_m)
+            assert (latitude, longitude) == pytest.approx(expected[:2], abs=1e-8)
+            height = placemark.findtext("w:executeHeight", None, WPML) or placemark.findtext("w:height", "", WPML)
+            assert float(height) == pytest.approx(waypoint.position_m[2] - plan.home_m[2], abs=1e-3)
+            assert placemark.findtext("w:waypointTurnParam/w:waypointTurnMode", "", WPML).startswith("toPointAndStop")
+            does = [a.text for a in placemark.findall(".//w:actionActuatorFunc", WPML)]
+            shoots = ["gimbalRotate", "rotateYaw", "hover", "takePhoto"]
+            assert does == (shoots if waypoint.kind == "shooting" else [])
+    (shot,) = waylines.findall(".//w:actionGroup/..", WPML)
+    assert float(shot.findtext(".//w:gimbalPitchRotateAngle", "", WPML)) == -12.5
+    assert float(shot.findtext(".//w:aircraftHeading", "", WPML)) == pytest.approx(-0.1)  # 359.9°
+    assert shot.findtext(".//w:fileSuffix", "", WPML) == "wall-01-0001"
+    assert waylines.findtext(".//w:finishAction", "", WPML) == "autoLand"
+    again = tmp_path / "again"
+    write_missions(plan, again)
+    assert (tmp_path / "again.kmz").read_bytes() == (tmp_path / "mission.kmz").read_bytes()
+
+
+def test_kml_and_csv_carry_every_position(tmp_path: Path) -> None:
+    plan = a_plan()
+    write_missions(plan, tmp_path / "mission")
+    places = [plan.origin.to_geographic(w.position_m) for w in plan.waypoints]
+    root = ElementTree.parse(tmp_path / "mission.kml").getroot()
+    path = root.findtext(".//k:LineString/k:coordinates", "", WPML).split()
+    home = plan.origin.to_geographic(plan.home_m)
+    for text, (latitude, longitude, altitude) in zip(path, [home, *places, home], strict=True):
+        assert [float(x) for x in text.split(",")] == pytest.approx([longitude, latitude, altitude], abs=6e-4)
+        assert float(text.split(",")[0]) == pytest.approx(longitude, abs=1e-8)
+    assert root.findtext(".//k:Placemark[2]/k:name", "", WPML) == "wall-01-0001"
+    with (tmp_path / "mission.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    for row, waypoint, (latitude, longitude, _) in zip(rows, plan.waypoints, places, strict=True):
+        assert float(row["latitude_deg"]) == pytest.approx(latitude, abs=1e-8)
+        assert float(row["longitude_deg"]) == pytest.approx(longitude, abs=1e-8)
+        assert (row["kind"], row["photo"]) == (waypoint.kind, waypoint.photo or "")
+
+
+def test_the_fence_and_a_rally_point_go_into_the_plan(tmp_path: Path) -> None:
+    fence = ((-20.0, -20.0), (20.0, -20.0), (20.0, 20.0))
+    aside = Box(low_m=(10.0, -15.0, 0.0), high_m=(15.0, -12.0, 5.0))
+    flown_over = Box(low_m=(2.0, -7.0, 0.0), high_m=(5.0, -6.0, 2.0))
+    plan = a_plan().model_copy(update={"fence_m": fence, "no_fly_m": (aside, flown_over)})
+    write_plan(plan, tmp_path / "m.plan")
+    back = read_plan(tmp_path / "m.plan")
+    stays, leaves = back.fences["polygons"]
+    assert (stays["inclusion"], leaves["inclusion"]) == (True, False)
+    assert len(leaves["polygon"]) == 4
+    for corner, place in zip(stays["polygon"], fence, strict=True):
+        assert ORIGIN.to_enu(*corner, ORIGIN.altitude_m)[:2] == pytest.approx(place, abs=1e-3)
+    (rally,) = back.rally_points["points"]
+    assert rally[:2] == pytest.approx(ORIGIN.to_geographic(plan.waypoints[0].position_m)[:2], abs=1e-8)
+    assert rally[2] == 3.5
 
 
 def test_waypoints_carry_eight_decimals(tmp_path: Path) -> None:
