@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from schemas.mosaic import Mosaic
     from schemas.settings import DetectSettings
 
-Method = Literal["hairline", "paper", "global"]
+Method = Literal["hairline", "ridge", "paper", "global"]
 
 
 @app.command

@@ -73,9 +73,9 @@ class PatternSettings(Contract):
 
 
 class DetectSettings(Contract):
-    method: Literal["hairline", "paper", "global"] = "hairline"
+    method: Literal["hairline", "ridge", "paper", "global"] = "hairline"
     window_px: int | None = Field(default=None, ge=3)  # paper's N; cracks up to N/2 wide; None: 63
-    k: float = Field(default=0.5, gt=0, lt=1)  # paper; `hairline` lowers it where the surface is smooth
+    k: float = Field(default=0.5, gt=0, lt=1)  # paper; `ridge` lowers it where the surface is smooth
     R: float = Field(default=128.0, gt=0)  # paper
     global_threshold: int | None = Field(default=None, ge=1, le=254)  # of `global`; None: from the peaks
     baselines: bool = False  # also the global thresholds 125, 155 and the peaks' own, for the report

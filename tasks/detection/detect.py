@@ -12,9 +12,9 @@ from tasks.detection.bands import by_bands
 from tasks.detection.components import long_and_thin
 from tasks.detection.edges import without_soft
 from tasks.detection.global_threshold import PAPER, Histogram, darker_than, from_peaks, otsu
-from tasks.detection.hairline import SEED, Scale, dark_levels
 from tasks.detection.joints import Joint, without_joints
 from tasks.detection.paper import paper_mask
+from tasks.detection.ridge import SEED, Scale, dark_levels
 from tasks.detection.sauvola import Mask, grey_of
 
 WINDOW_PX = 63  # N: best on our development photos (METHOD); holds cracks of up to half of it, 31 px
@@ -57,10 +57,10 @@ def detect_raster(
     if settings.method == "global":
         threshold = settings.global_threshold or from_peaks(red_histogram(raster), peaks)
         return DetectionArrays(global_mask(raster, threshold), count_valid(raster))
-    return _hairline(raster, settings, Scale.of_window(window), gsd_mm_px, on_progress)
+    return _ridge(raster, settings, Scale.of_window(window), gsd_mm_px, on_progress)
 
 
-def _hairline(
+def _ridge(
     raster: Raster,
     settings: DetectSettings,
     scale: Scale,

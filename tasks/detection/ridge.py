@@ -1,4 +1,4 @@
-"""Method `hairline`: Sauvola's threshold on valid pixels, its k bound to the texture of the surface.
+"""Method `ridge`, training-free: Sauvola's threshold on valid pixels, k bound to the surface's texture.
 
 Sauvola's k says how much darker than its surroundings a pixel must be. On a smooth surface the paper's 0.5
 misses every faint crack, on a rough one a small k floods. So k follows the texture: the deviation of the
