@@ -6,6 +6,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -13,6 +15,7 @@ from artifacts import atlas, crack_tables, palette, precision
 from artifacts.cloud_sample import cloud_sample
 from artifacts.data_uri import png_uri
 from artifacts.inspected_surface import Seen, SurfacePages, crack_numbers, matched, surface_pages
+from artifacts.orbit import orbit_view
 from artifacts.summary import Summary
 from artifacts.track_picture import track_picture
 from artifacts.view3d import Scene, cloud_picture, has_underside, picture
@@ -29,7 +32,7 @@ from schemas.problem import LeftOut
 from schemas.registered_model import RegisteredModel
 from schemas.structure import Structure
 
-DATA_FILES = ("templates/report.html", "templates/report.css", "templates/sorting.js")
+DATA_FILES = ("templates/report.html", "templates/report.css", "templates/sorting.js", "templates/orbit.js")
 STAGES = ("registration", "surfaces", "planning", "flight", "photos", "stitching", "patterns", "detection")
 INSPECTED = "#8fc1d4"  # on the map; other surfaces are grey
 
@@ -59,6 +62,7 @@ def write_report(
     seen = matched(mosaics, measurements, patterns, detections, report.cracks)
     pages = list(surface_pages(seen, inspection, open_file))
     flats = [laid for one in seen if (laid := atlas.flat(one.mosaic, one.cracks)) is not None]
+    cloud = cloud_sample(open_file(model.cloud)) if model else None
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True,
@@ -75,13 +79,14 @@ def write_report(
         stitched=[one for one in seen if len(one.mosaic.placements) > 1],
         rows=_crack_rows(report.cracks, pages),
         map_pictures=_map(report, seen, structure),
+        orbit=orbit_view(Scene(structure, plan, log, report.cracks, _inspected(seen)), cloud),
         atlas=atlas.atlas(flats, {one.mosaic.name: f"#{one.anchor}" for one in seen})
         if flats
         else Markup(""),
         not_inspected=_by_stage(report.not_inspected),
         structure=structure,
         model=model,
-        cloud_picture=_cloud(model, open_file),
+        cloud_picture=_cloud_picture(model, cloud),
         plan=plan,
         plan_picture=png_uri(picture(Scene(structure, plan, log))) if plan else None,
         log=log,
@@ -117,20 +122,25 @@ def _map(report: CrackReport, seen: Sequence[Seen], structure: Structure | None)
     """(caption, picture) of the structure with its cracks, from above and where needed from below."""
     if structure is None or not structure.surfaces:
         return []
-    inspected = {one.mosaic.surface.name: INSPECTED for one in seen if one.mosaic.surface is not None}
-    scene = Scene(structure, cracks=report.cracks, colours=inspected)
+    scene = Scene(structure, cracks=report.cracks, colours=_inspected(seen))
     shown = [("From above", png_uri(picture(scene)))]
     if has_underside(scene):
         shown.append(("From below", png_uri(picture(scene, from_below=True))))
     return shown
 
 
-def _cloud(model: RegisteredModel | None, open_file: Callable[[File], Path]) -> str | None:
-    if model is None:
+def _inspected(seen: Sequence[Seen]) -> dict[str, str] | None:
+    """The colour of inspected surfaces; None where there are none yet, and each has a colour of its own."""
+    return {one.mosaic.surface.name: INSPECTED for one in seen if one.mosaic.surface is not None} or None
+
+
+def _cloud_picture(
+    model: RegisteredModel | None, cloud: tuple[npt.NDArray[np.float64], npt.NDArray[np.intp]] | None
+) -> str | None:
+    if model is None or cloud is None:
         return None
-    points_m, stations = cloud_sample(open_file(model.cloud))
     places = [(s.T_world_scan[0][3], s.T_world_scan[1][3], s.T_world_scan[2][3]) for s in model.stations]
-    return png_uri(cloud_picture(points_m, stations, [s.name for s in model.stations], places))
+    return png_uri(cloud_picture(*cloud, [s.name for s in model.stations], places))
 
 
 def _by_stage(left_out: Iterable[LeftOut]) -> list[tuple[str, list[LeftOut]]]:

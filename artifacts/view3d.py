@@ -67,7 +67,7 @@ def picture(scene: Scene, width_px: int = 1500, height_px: int = 900, from_below
     """PNG of a scene from the side that shows most of its surfaces, from above or from below."""
     view = View(
         _extent_m(scene),
-        _azimuth_deg(scene, from_below),
+        best_azimuth_deg(scene, from_below),
         BELOW_DEG if from_below else ABOVE_DEG,
         SUPERSAMPLED * width_px,
         SUPERSAMPLED * (height_px - LEGEND_PX),
@@ -157,8 +157,9 @@ def _extent_m(scene: Scene) -> Array:
     return np.vstack(corners) if corners else np.zeros((0, 3))
 
 
-def _azimuth_deg(scene: Scene, from_below: bool) -> float:
-    """Where most area is seen, and rather many faces obliquely than one from its front."""
+def best_azimuth_deg(scene: Scene, from_below: bool = False) -> float:
+    """Where to stand, clockwise from north: where most area is seen, rather many faces obliquely than one
+    from its front."""
     elevation = np.radians(BELOW_DEG if from_below else ABOVE_DEG)
     best, best_seen = 205.0, -1.0
     for azimuth_deg in range(5, 365, 10):
