@@ -90,7 +90,9 @@ class _Growing:
         """Place the candidate where it contradicts the placed stations least, if it may stand there."""
         best: tuple[float, Array] | None = None
         sample = balanced_sample(self.shapes[candidate].cloud, SEARCH_POINTS, 0)
-        for T in self._proposals(candidate):
+        for T, stated in self._proposals(candidate):
+            if best is not None and not stated and self._as_stated(candidate, best[1]):
+                break
             aligned = align(sample, self.union, T, self.reach_m, iterations=10)
             if aligned is None:
                 continue
@@ -109,15 +111,26 @@ class _Growing:
         self._unite()
         return True
 
-    def _proposals(self, candidate: int) -> Iterator[Array]:
+    def _as_stated(self, candidate: int, T: Array) -> bool:
+        """Whether the candidate came to stand where it was measured: two witnesses, and neither saw the search."""
+        site, T_frame_world = self.sites[candidate], self._frame_of_world()
+        if site.position_m is None or site.scanner_m is None or T_frame_world is None:
+            return False
+        apart_m = transform(T, site.scanner_m[None])[0] - transform(T_frame_world, site.position_m[None])[0]
+        return bool(np.linalg.norm(apart_m) < world_frame.AGREE_M)
+
+    def _proposals(self, candidate: int) -> Iterator[tuple[Array, bool]]:
+        """T_frame_local, and whether it stands on a statement."""
         site, shape = self.sites[candidate], self.shapes[candidate]
         T_frame_world = self._frame_of_world()
         if site.prior_T_world_local is not None and T_frame_world is not None:
-            yield T_frame_world @ site.prior_T_world_local
+            yield T_frame_world @ site.prior_T_world_local, True
         if site.position_m is not None and site.scanner_m is not None:
-            yield from self._turned(site, shape, T_frame_world)
-        yield from self._least_contradicting(candidate, self._by_plan(shape))
-        yield from self._least_contradicting(candidate, self._by_features(shape))
+            for T in self._turned(site, shape, T_frame_world):
+                yield T, True
+        for search in (self._by_plan, self._by_features):
+            for T in self._least_contradicting(candidate, search(shape)):
+                yield T, False
 
     def _turned(self, site: Site, shape: Shape, T_frame_world: Array | None) -> Iterator[Array]:
         """Proposals from the measured position; none where no placed station has one."""
