@@ -2,9 +2,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
+PHOTOS ?= ../shared/data/cracks/uav
 BENCHES := detection
 
-.PHONY: demo test check bench $(addprefix bench-,$(BENCHES)) lock clean
+.PHONY: demo test check bench $(addprefix bench-,$(BENCHES)) train-detector lock clean
 
 demo: .venv/.ready
 	$(BIN)/hairline demo --out runs/demo
@@ -22,6 +23,12 @@ bench: $(addprefix bench-,$(BENCHES))
 
 $(addprefix bench-,$(BENCHES)): bench-%: .venv/.ready
 	$(BIN)/python -m tests.benchmarks.$*
+
+train-detector: .venv/.ready  # two hours on two cores; PHOTOS holds images/, masks/ and groups.txt (CC0)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[train]'
+	$(BIN)/python -m training.surfaces build/training/surfaces 330
+	$(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/run --fold 0
+	$(BIN)/python -m training.export build/training/run/weights.pt build/training/hairline.onnx
 
 .venv/.ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \

@@ -1,0 +1,1 @@
+"""Training of the detector's network: stands apart from the product, which never imports it."""

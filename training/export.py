@@ -1,0 +1,40 @@
+"""Write trained weights as ONNX: `python -m training.export WEIGHTS.pt MODEL.onnx [TEMPERATURE]`.
+
+The logits are divided by the temperature, which training.calibrate finds on photos that were held out."""
+
+import hashlib
+import sys
+import warnings
+from pathlib import Path
+
+import torch
+
+from training.network import Network
+
+
+def main(weights: Path, model: Path, temperature: float = 1.0) -> None:
+    net = Network()
+    net.load_state_dict(torch.load(weights, weights_only=True))
+    shape = net.unfold[0]
+    with torch.no_grad():
+        shape.weight /= temperature
+        shape.bias /= temperature
+    sides = {"rgb": {2: "height", 3: "width"}, "logit": {2: "height", 3: "width"}}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # PyTorch announces another exporter, which needs two more packages
+        torch.onnx.export(
+            net.eval(),
+            (torch.zeros(1, 3, 64, 64),),
+            str(model),
+            input_names=["rgb"],
+            output_names=["logit"],
+            dynamic_axes=sides,
+            opset_version=13,
+            dynamo=False,
+        )
+    content = model.read_bytes()
+    print(f"{model}: {len(content)} bytes, SHA-256 {hashlib.sha256(content).hexdigest()}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]), *(float(t) for t in sys.argv[3:]))

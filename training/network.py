@@ -1,0 +1,76 @@
+"""The network: a U-Net of depthwise convolutions. Nothing runs at full resolution: the first layer folds
+each 2×2 pixels into 24 channels, the last unfolds them, so that edges keep their place at a quarter of the
+cost."""
+
+from torch import Tensor, nn
+
+WIDTHS = (24, 48, 96, 128)  # channels at 1/2, 1/4, 1/8, 1/16
+DEPTHS = (2, 3, 4, 5)  # layers there
+
+
+class Mixed(nn.Sequential):
+    """1×1 convolution, batch norm, ReLU."""
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__(
+            nn.Conv2d(inputs, outputs, 1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU(inplace=True)
+        )
+
+
+class Separable(nn.Module):
+    """Depthwise 3×3, then 1×1; added to its input where the shapes agree."""
+
+    def __init__(self, inputs: int, outputs: int, stride: int = 1) -> None:
+        super().__init__()
+        self.across = nn.Conv2d(inputs, inputs, 3, stride, 1, groups=inputs, bias=False)
+        self.mix = Mixed(inputs, outputs)
+        self.same = inputs == outputs and stride == 1
+
+    def forward(self, x: Tensor) -> Tensor:
+        y: Tensor = self.mix(self.across(x))
+        return x + y if self.same else y
+
+
+class Up(nn.Module):
+    """The deeper level's features, mixed to this level's width, enlarged, added and smoothed."""
+
+    def __init__(self, deep: int, width: int) -> None:
+        super().__init__()
+        self.mix = Mixed(deep, width)
+        self.enlarge = nn.Upsample(scale_factor=2, mode="nearest")
+        self.join = Separable(width, width)
+
+    def forward(self, deep: Tensor, here: Tensor) -> Tensor:
+        out: Tensor = self.join(here + self.enlarge(self.mix(deep)))
+        return out
+
+
+class Network(nn.Module):
+    """(N, 3, H, W) RGB in 0..1 to (N, 1, H, W) logits; H and W multiples of 16."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        a, b, c, d = WIDTHS
+        self.fold = nn.Sequential(
+            nn.Conv2d(3, a, 4, 2, 1, bias=False), nn.BatchNorm2d(a), nn.ReLU(inplace=True)
+        )
+        self.down = nn.ModuleList()
+        for (before, here), depth in zip(((a, a), (a, b), (b, c), (c, d)), DEPTHS, strict=True):
+            first = Separable(before, here, 1 if before == here else 2)
+            self.down.append(nn.Sequential(first, *(Separable(here, here) for _ in range(depth - 1))))
+        self.up = nn.ModuleList([Up(d, c), Up(c, b), Up(b, a)])
+        self.last = Separable(a, a)
+        shape = nn.Conv2d(a, 4, 3, padding=1)
+        nn.init.constant_(shape.bias, -3.0)  # type: ignore[arg-type]  # cracks are rare
+        self.unfold = nn.Sequential(shape, nn.PixelShuffle(2))
+
+    def forward(self, rgb: Tensor) -> Tensor:
+        y = self.fold(2.0 * rgb - 1.0)
+        levels = []
+        for down in self.down:
+            y = down(y)
+            levels.append(y)
+        for up, here in zip(self.up, levels[-2::-1], strict=True):
+            y = up(y, here)
+        out: Tensor = self.unfold(self.last(y))
+        return out

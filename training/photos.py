@@ -1,0 +1,121 @@
+"""Crops to learn from: photos with masks, turned, scaled, relit, blurred, noisy."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from skimage.morphology import skeletonize
+
+SIDE_PX = 160
+ON_CRACK = 0.7  # share of the crops of a photo with a crack that are centred on it
+FOLDS = 5
+
+Pixels = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Photo:
+    """rgb (H, W, 3); truth (H, W, 2) of 0/255: cracks, and their centrelines, three pixels wide."""
+
+    name: str
+    rgb: Pixels
+    truth: Pixels
+    on_crack: npt.NDArray[np.int32]  # (n, 2) y, x of some pixels of the cracks
+    scales: tuple[float, float]
+
+
+def read(folder: Path, names: list[str], scales: tuple[float, float]) -> list[Photo]:
+    """The named photos of FOLDER/images with their masks of FOLDER/masks."""
+    photos = []
+    for name in names:
+        bgr = cv2.imread(str(folder / "images" / name), cv2.IMREAD_COLOR)
+        mask = cv2.imread(str(folder / "masks" / name), cv2.IMREAD_GRAYSCALE)
+        if bgr is None or mask is None:
+            raise SystemExit(f"{folder}: {name} or its mask cannot be read")
+        crack = (mask > 0).astype(np.uint8)
+        line = cv2.dilate(np.asarray(skeletonize(crack > 0), np.uint8), np.ones((3, 3), np.uint8))
+        truth = 255 * np.dstack([crack, line])
+        on_crack = np.argwhere(crack > 0)[::7].astype(np.int32)
+        photos.append(Photo(name, np.ascontiguousarray(bgr[..., ::-1]), truth, on_crack, scales))
+    return photos
+
+
+def by_fold(groups: Path) -> list[list[str]]:
+    """Names of each of FOLDS folds: groups of one photo stay together, folds are of nearly equal size."""
+    members: dict[str, list[str]] = {}
+    for row in groups.read_text().split("\n"):
+        if row.strip():
+            name, group = row.split()
+            members.setdefault(group, []).append(name)
+    folds: list[list[str]] = [[] for _ in range(FOLDS)]
+    for group in sorted(members, key=lambda g: (-len(members[g]), int(g))):
+        min(folds, key=len).extend(members[group])
+    return [sorted(fold) for fold in folds]
+
+
+def crop(photo: Photo, rng: Rng) -> tuple[Floats, Floats]:
+    """(3, SIDE_PX, SIDE_PX) RGB in 0..1 and (2, SIDE_PX, SIDE_PX) truth, as drawn."""
+    height, width = photo.rgb.shape[:2]
+    scale = float(np.exp(rng.uniform(*np.log(photo.scales))))
+    if len(photo.on_crack) and rng.random() < ON_CRACK:
+        off = rng.uniform(-0.35, 0.35, 2) * SIDE_PX / scale
+        y, x = photo.on_crack[rng.integers(len(photo.on_crack))] + off
+    else:
+        y, x = rng.uniform(0, height), rng.uniform(0, width)
+    angle = rng.uniform(0, 2 * np.pi) if rng.random() < 0.6 else rng.integers(4) * np.pi / 2
+    c, s = scale * np.cos(angle), scale * np.sin(angle)
+    flip = rng.choice([-1.0, 1.0])
+    A = np.array([[c * flip, -s, 0.0], [s * flip, c, 0.0]])
+    A[:, 2] = SIDE_PX / 2 - A[:, :2] @ (x, y)
+    rgb = photo.rgb if scale > 0.8 else _softened(photo.rgb, (x, y), scale)
+    seen = _seen(_warped(rgb, A).astype(np.float32) / np.float32(255.0), rng)
+    truth = _warped(photo.truth, A)
+    return seen.transpose(2, 0, 1), (truth > 110).astype(np.float32).transpose(2, 0, 1)
+
+
+def _warped(picture: Pixels, A: npt.NDArray[np.float64]) -> Pixels:
+    side, mirrored = (SIDE_PX, SIDE_PX), cv2.BORDER_REFLECT_101
+    return np.asarray(cv2.warpAffine(picture, A, side, flags=cv2.INTER_LINEAR, borderMode=mirrored), np.uint8)
+
+
+def _softened(rgb: Pixels, at: tuple[float, float], scale: float) -> Pixels:
+    """The photo, blurred around `at` as much as a reduction by `scale` asks for."""
+    reach = int(0.75 * SIDE_PX / scale) + 8
+    rows = slice(max(0, int(at[1]) - reach), max(0, int(at[1]) + reach))
+    columns = slice(max(0, int(at[0]) - reach), max(0, int(at[0]) + reach))
+    soft = rgb.copy()
+    if soft[rows, columns].size:
+        soft[rows, columns] = cv2.GaussianBlur(rgb[rows, columns], (0, 0), 0.45 * np.sqrt(1 / scale**2 - 1))
+    return soft
+
+
+def _seen(rgb: Floats, rng: Rng) -> Floats:
+    """Another camera, another light."""
+    if rng.random() < 0.3:
+        y, x = np.mgrid[:SIDE_PX, :SIDE_PX].astype(np.float32) / SIDE_PX - 0.5
+        angle = rng.uniform(0, 2 * np.pi)
+        across = x * np.float32(np.cos(angle)) + y * np.float32(np.sin(angle)) - rng.uniform(-0.4, 0.4)
+        edge = np.exp(rng.uniform(np.log(0.002), np.log(0.5)))
+        shade = rng.uniform(0.1, 0.65) / (1.0 + np.exp(np.clip(across / edge, -40, 40)))
+        rgb = rgb * (1.0 - shade)[..., None]
+    gain = np.exp(rng.normal(0.0, 0.3) + rng.normal(0.0, 0.06, 3))
+    rgb = np.clip(rgb * gain, 1e-3, 1.0) ** np.exp(rng.normal(0.0, 0.25))
+    grey = rgb.mean(axis=2, keepdims=True)
+    if rng.random() < 0.5:
+        rgb = grey + (rgb - grey) * rng.choice([0.0, rng.uniform(0.0, 1.6)])
+    middle = grey.mean()
+    rgb = middle + (rgb - middle) * np.exp(rng.normal(0.0, 0.25))
+    rgb = np.ascontiguousarray(rgb, np.float32)
+    if rng.random() < 0.5:
+        soft = np.asarray(cv2.GaussianBlur(rgb, (0, 0), float(rng.uniform(0.4, 1.3))), np.float32)
+        rgb = soft if rng.random() < 0.7 else rgb + rng.uniform(0.3, 1.0) * (rgb - soft)
+    if rng.random() < 0.6:
+        fine = rng.standard_normal(rgb.shape, np.float32)
+        if rng.random() < 0.5:
+            fine = fine[..., :1]
+        rgb = rgb + np.float32(rng.uniform(0.003, 0.05)) * fine
+    return np.clip(rgb, 0.0, 1.0).astype(np.float32)

@@ -1,0 +1,128 @@
+"""Train the network: `python -m training.train PHOTOS SURFACES OUT [--fold N] [--steps N]`.
+
+PHOTOS holds images/, masks/ and groups.txt, SURFACES what training.surfaces wrote. With --fold the photos of
+that fold (by group) are left out and judged along the way; without, all take part. Half of each batch is
+photos, half surfaces. One thread and a seed: the same result on the same machine.
+"""
+
+import argparse
+import copy
+import math
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from training.network import Network
+from training.photos import Photo, by_fold, crop, read
+
+BATCH = 8  # half of it photos, half surfaces
+RATE, WARM_UP, DECAY = 3e-3, 300, 1e-3
+AVERAGED = 0.998  # weights are averaged over about 1 / (1 − AVERAGED) steps: these are judged and kept
+EVERY = 500  # steps between checkpoints
+
+
+def loss_of(logit: Tensor, truth: Tensor) -> Tensor:
+    """Cross entropy for calibrated probabilities, Dice for areas, and recall of centrelines: a crack that is
+    cut costs as much where it is thin as where it is wide. logit (N, 1, H, W), truth (N, 2, H, W)."""
+    crack, line = truth[:, :1], truth[:, 1:]
+    entropy = functional.binary_cross_entropy_with_logits(logit, crack)
+    p = torch.sigmoid(logit)
+    dice = 1.0 - (2.0 * (p * crack).sum() + 1.0) / (p.sum() + crack.sum() + 1.0)
+    missed = 1.0 - ((p * line).sum() + 1.0) / (line.sum() + 1.0)
+    return 3.0 * entropy + 0.5 * dice + 0.25 * missed
+
+
+def batch(photos: list[Photo], surfaces: list[Photo], seed: int) -> tuple[Tensor, Tensor]:
+    rng = np.random.default_rng(seed)
+    pairs = [
+        crop((photos if k % 2 == 0 else surfaces)[rng.integers(len(photos if k % 2 == 0 else surfaces))], rng)
+        for k in range(BATCH)
+    ]
+    return torch.from_numpy(np.stack([p[0] for p in pairs])), torch.from_numpy(
+        np.stack([p[1] for p in pairs])
+    )
+
+
+@torch.no_grad()
+def probabilities(net: Network, rgb: np.ndarray) -> np.ndarray:
+    """(H, W) float32 of an (H, W, 3) uint8 photo."""
+    height, width = rgb.shape[:2]
+    padded = cv2.copyMakeBorder(rgb, 0, -height % 16, 0, -width % 16, cv2.BORDER_REFLECT_101)
+    x = torch.from_numpy(np.ascontiguousarray(padded.transpose(2, 0, 1))[None]).float() / 255.0
+    out: np.ndarray = torch.sigmoid(net(x))[0, 0, :height, :width].numpy()
+    return out
+
+
+def judged(net: Network, photos: list[Photo]) -> str:
+    """Aggregate F1 at 0 px at a few thresholds."""
+    thresholds = (0.3, 0.4, 0.5, 0.6)
+    counts = np.zeros((len(thresholds), 3))
+    for photo in photos:
+        p, truth = probabilities(net, photo.rgb), photo.truth[..., 0] > 0
+        for k, threshold in enumerate(thresholds):
+            found = p >= threshold
+            counts[k] += (found & truth).sum(), found.sum(), truth.sum()
+    f1 = 2 * counts[:, 0] / np.maximum(counts[:, 1] + counts[:, 2], 1)
+    return " ".join(f"{t}:{f:.3f}" for t, f in zip(thresholds, f1, strict=True))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("photos", type=Path)
+    parser.add_argument("surfaces", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--fold", type=int)
+    parser.add_argument("--steps", type=int, default=10000)
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(1)
+    torch.manual_seed(args.seed)
+    cv2.setNumThreads(0)
+    folds = by_fold(args.photos / "groups.txt")
+    left_out = [] if args.fold is None else folds[args.fold]
+    kept = [name for fold in folds for name in fold if name not in left_out]
+    photos = read(args.photos, kept, (0.5, 2.0))
+    held = read(args.photos, left_out, (1.0, 1.0))
+    surfaces = read(args.surfaces, sorted(p.name for p in (args.surfaces / "masks").iterdir()), (0.7, 1.5))
+
+    net = Network().to(memory_format=torch.channels_last)
+    averaged = copy.deepcopy(net).eval()
+    optimiser = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=DECAY)
+    began, total = time.monotonic(), 0.0
+    with ThreadPoolExecutor(1) as ahead:
+        coming = ahead.submit(batch, photos, surfaces, args.seed << 32)
+        for step in range(1, args.steps + 1):
+            rgb, truth = coming.result()
+            coming = ahead.submit(batch, photos, surfaces, (args.seed << 32) + step)
+            rate = RATE * min(step / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / args.steps))
+            for group in optimiser.param_groups:
+                group["lr"] = rate
+            with torch.autocast("cpu", torch.bfloat16):
+                logit = net(rgb.contiguous(memory_format=torch.channels_last))
+            loss = loss_of(logit.float(), truth)
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+            total += float(loss)
+            keep = min(AVERAGED, (1 + step) / (10 + step))
+            with torch.no_grad():
+                for mine, new in zip(averaged.state_dict().values(), net.state_dict().values(), strict=True):
+                    if mine.dtype.is_floating_point:
+                        mine.mul_(keep).add_(new, alpha=1.0 - keep)
+            if step % EVERY == 0 or step == args.steps:
+                torch.save(averaged.state_dict(), args.out / "weights.pt")
+                minutes = (time.monotonic() - began) / 60
+                held_out = judged(averaged, held) if held and step % (2 * EVERY) == 0 else ""
+                print(f"{step} {minutes:.1f} min, loss {total / EVERY:.4f} {held_out}", flush=True)
+                total = 0.0
+
+
+if __name__ == "__main__":
+    main()
