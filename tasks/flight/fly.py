@@ -16,6 +16,7 @@ from tasks.flight.recording import Recorder, Recording, archive
 from tasks.flight.upload import abandon_mission, upload_mission
 
 AUTO, GUIDED = 3, 4  # ArduCopter's modes
+ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 COPTERS = (
     mavlink.MAV_TYPE_QUADROTOR,
     mavlink.MAV_TYPE_COAXIAL,
@@ -143,28 +144,30 @@ class Flight:
         return recording
 
     def _arm(self, recorder: Recorder) -> None:
-        self._set_mode(GUIDED)  # in which it arms without a radio's throttle
-        until = time.monotonic() + 2 * self.link.timeout_s  # filters settle for a while after power-up
+        """Into GUIDED, in which it arms without a radio's throttle, and armed. Just after power-up both are
+        refused until the filters have settled."""
+        until = time.monotonic() + 2 * self.link.timeout_s
         self.warnings.clear()
         self._next_recorder = recorder
         while True:
-            result = self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-            if result == mavlink.MAV_RESULT_ACCEPTED:
-                return
+            refusal = "the vehicle does not change to GUIDED"
+            if self._set_mode(GUIDED):
+                refusal = "the vehicle refuses to arm"
+                if self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED:
+                    return
             if time.monotonic() + ARM_RETRY_S > until:
-                raise self._problem("the vehicle refuses to arm")
+                raise self._problem(refusal)
             self.link.expect((), ARM_RETRY_S)
 
-    def _set_mode(self, mode: int) -> None:
+    def _set_mode(self, mode: int) -> bool:
         custom = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        if self.link.command(mavlink.MAV_CMD_DO_SET_MODE, custom, mode) != mavlink.MAV_RESULT_ACCEPTED:
-            name = "AUTO" if mode == AUTO else "GUIDED"
-            raise self._problem(f"the vehicle does not change to {name}")
+        return bool(self.link.command(mavlink.MAV_CMD_DO_SET_MODE, custom, mode) == ACCEPTED)
 
     def _start(self) -> None:
-        self._set_mode(AUTO)
+        if not self._set_mode(AUTO):
+            raise self._problem("the vehicle does not change to AUTO")
         result = self.link.command(mavlink.MAV_CMD_MISSION_START)
-        if result != mavlink.MAV_RESULT_ACCEPTED and not self.reader.recording.armed_s:
+        if result != ACCEPTED and not self.reader.recording.armed_s:
             raise self._problem("the vehicle does not start the mission")
 
     def _follow(self, on_progress: Callable[[float], None]) -> None:
@@ -211,6 +214,4 @@ class Flight:
 
 
 def _armed(ack: Any) -> bool:
-    return bool(
-        ack.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and ack.result == mavlink.MAV_RESULT_ACCEPTED
-    )
+    return bool(ack.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and ack.result == ACCEPTED)

@@ -33,6 +33,7 @@ class Faults:
     loss: float = 0.0  # share of frames lost in either direction
     silent: bool = False  # takes the connection and says nothing
     refuse_arm: bool = False
+    settling: int = 0  # so often it refuses to leave its mode: its position is not good enough yet
     lose_last_item: bool = False  # of an uploaded mission
     vanish_s: float | None = None  # the link ends at this time of the flight
 
@@ -62,6 +63,7 @@ class Autopilot:
         self.incoming: list[MissionItem] = []
         self.expected = 0  # items of the upload in progress; 0: none
         self.armed, self.mode = False, STABILIZE
+        self._refused_modes = 0
 
     # -- link ------------------------------------------------------------------------------------------
 
@@ -181,7 +183,7 @@ class Autopilot:
         if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             result = self._arm() if message.param1 == 1.0 else self._disarm()
         elif message.command == mavlink.MAV_CMD_DO_SET_MODE:
-            self.mode = int(message.param2)
+            result = self._change_mode(int(message.param2))
         elif message.command == mavlink.MAV_CMD_MISSION_START:
             result = accepted if self.armed and len(self.mission) > 1 else denied
         elif message.command == mavlink.MAV_CMD_DO_SEND_BANNER:
@@ -192,6 +194,14 @@ class Autopilot:
         if message.command == mavlink.MAV_CMD_MISSION_START and result == accepted:
             self.mode = AUTO
             self._fly()
+
+    def _change_mode(self, mode: int) -> int:
+        if self._refused_modes < self.faults.settling:
+            self._refused_modes += 1
+            self._say("Mode change to GUIDED failed: requires position", mavlink.MAV_SEVERITY_WARNING)
+            return int(mavlink.MAV_RESULT_FAILED)
+        self.mode = mode
+        return int(mavlink.MAV_RESULT_ACCEPTED)
 
     def _arm(self) -> int:
         if self.faults.refuse_arm:

@@ -41,6 +41,7 @@ def start_vehicle(plan: FlightPlan, seed: int, faults: Faults | None = None) -> 
     airframe = Airframe(vehicle=plan.vehicle, origin=plan.origin, home_m=plan.home_m)
     command = [sys.executable, "-m", "tasks.simulation.vehicle", "--port", "0", "--seed", str(seed)]
     command += ["--airframe", airframe.model_dump_json(), "--loss", str(faults.loss)]
+    command += ["--settling", str(faults.settling)]
     command += [f"--{name.replace('_', '-')}" for name in _SWITCHES if getattr(faults, name)]
     if faults.vanish_s is not None:
         command += ["--vanish-s", str(faults.vanish_s)]
@@ -81,6 +82,7 @@ def main() -> None:
     where.add_argument("--airframe", help="JSON with vehicle, origin, home_m")
     parser.add_argument("--loss", type=float, default=0.0, help="share of frames lost in either direction")
     parser.add_argument("--vanish-s", type=float, help="end the link at this time of the flight")
+    parser.add_argument("--settling", type=int, default=0, help="refuse as many changes of mode")
     for switch in _SWITCHES:
         parser.add_argument(f"--{switch.replace('_', '-')}", action="store_true")
     options = parser.parse_args()
@@ -90,7 +92,12 @@ def main() -> None:
     else:
         airframe = Airframe.model_validate_json(options.airframe)
     faults = Faults(
-        options.loss, options.silent, options.refuse_arm, options.lose_last_item, options.vanish_s
+        loss=options.loss,
+        silent=options.silent,
+        refuse_arm=options.refuse_arm,
+        settling=options.settling,
+        lose_last_item=options.lose_last_item,
+        vanish_s=options.vanish_s,
     )
     with socket.create_server(("127.0.0.1", options.port)) as server:
         print(f"tcp:127.0.0.1:{server.getsockname()[1]}", flush=True)

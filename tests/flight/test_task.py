@@ -82,6 +82,17 @@ def test_a_vehicle_that_refuses_to_arm_says_why_and_keeps_no_mission() -> None:
             assert read_back(link) == ()
 
 
+def test_a_vehicle_just_switched_on_is_waited_for() -> None:
+    with start_vehicle(PLAN, 3, Faults(settling=1)) as url:
+        assert fly.bare(PLAN, "1", url, 3.0).shots
+
+
+def test_a_vehicle_that_never_settles_says_why() -> None:
+    settling = r"does not change to GUIDED.*requires position"
+    with start_vehicle(PLAN, 3, Faults(settling=99)) as url, pytest.raises(BadInput, match=settling):
+        fly.bare(PLAN, "1", url, 1.0)
+
+
 def test_a_link_lost_in_flight_keeps_what_was_archived() -> None:
     lost = r"not heard for 1\.5 s, (29|30) s after arming"
     with start_vehicle(PLAN, 3, Faults(vanish_s=30.0)) as url, pytest.raises(BadInput, match=lost) as problem:
