@@ -36,7 +36,7 @@ def evaluate(
     method: Annotated[tuple[Method, ...], Parameter(consume_multiple=True)] = (),
     gsd_mm_px: float | None = None,
 ) -> None:
-    """Compare found cracks with drawn masks: precision, recall, F1 at 0 and 2 px, D/evaluation.json.
+    """Compare found cracks with drawn masks: precision, recall, F1 at 0, 2 and 5 px, D/evaluation.json.
 
     Parameters
     ----------
@@ -132,9 +132,16 @@ def read_mask(drawn: dict[str, Path], image: Path) -> Mask:
 
 
 def as_table(evaluations: list[Evaluation]) -> Table:
-    table = Table("method", "tolerance", "precision", "recall", "F1", "mean F1 of images")
+    table = Table(
+        "method", "tolerance", "precision", "recall", "F1", "95 %", "mean F1", "length found", "true"
+    )
     for one in evaluations:
-        whole = one.aggregate
-        figures = (whole.precision, whole.recall, whole.f1, one.mean.f1)
-        table.add_row(one.method, f"{one.tolerance_px} px", *(f"{figure:.3f}" for figure in figures))
+        whole, (low, high) = one.aggregate, one.f1_interval
+        table.add_row(
+            one.method,
+            f"{one.tolerance_px} px",
+            *(f"{figure:.3f}" for figure in (whole.precision, whole.recall, whole.f1)),
+            f"{low:.2f}–{high:.2f}",
+            *(f"{figure:.3f}" for figure in (one.mean.f1, one.length.recall, one.length.precision)),
+        )
     return table

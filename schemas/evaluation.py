@@ -1,6 +1,6 @@
 """How well found cracks agree with masks drawn by people."""
 
-from schemas.contract import Contract
+from schemas.contract import Contract, Vector2
 
 
 class Scores(Contract):
@@ -17,3 +17,6 @@ class Evaluation(Contract):
     images: int
     aggregate: Scores  # over the pixels of all images
     mean: Scores  # over images, each counting the same
+    length: Scores  # of centrelines: the share of found length that is right, of true length that is found
+    f1_interval: Vector2  # 95 % of the aggregate F1 when images are drawn anew (bootstrap)
+    false_length_per_mpx: float  # pixels of found centreline that are not right, per megapixel of image

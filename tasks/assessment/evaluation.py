@@ -1,7 +1,9 @@
 """Precision, recall and F1 of crack masks against masks drawn by people.
 
 At a tolerance of d px a found pixel is right if a true one lies within d px (Euclidean), and a true one
-counts as found if a found one lies within d px.
+counts as found if a found one lies within d px. Pixels score the style of a label as much as detection: one
+pixel of rim on a perfect mask of four gives F1 .80. So centrelines are scored as well, each against the
+other's: that is length found and length false, which an engineer reads.
 """
 
 from collections.abc import Iterable
@@ -13,7 +15,9 @@ import numpy.typing as npt
 
 from schemas.evaluation import Evaluation, Scores
 
-TOLERANCES_PX = (0, 2)
+TOLERANCES_PX = (0, 2, 5)
+DRAWN_ANEW = 1000  # bootstrap samples
+SEED = 0
 
 Mask = npt.NDArray[np.bool_]
 
@@ -35,6 +39,13 @@ def count(found: Mask, truth: Mask, tolerance_px: int) -> Counts:
     )
 
 
+def centreline(mask: Mask) -> Mask:
+    """The mask thinned to one pixel (Zhang & Suen 1984)."""
+    from skimage.morphology import skeletonize
+
+    return np.asarray(skeletonize(mask) > 0)  # type: ignore[no-untyped-call]
+
+
 def scores(counts: Counts) -> Scores:
     """Finding nothing where there is nothing is perfect; what is undefined otherwise is zero."""
     if counts.found == 0 and counts.true == 0:
@@ -47,22 +58,51 @@ def scores(counts: Counts) -> Scores:
 
 def evaluate(method: str, pairs: Iterable[tuple[Mask, Mask]]) -> tuple[Evaluation, ...]:
     """One Evaluation for each tolerance over (found, truth) masks; at least one pair."""
-    counted = [[count(found, truth, d) for d in TOLERANCES_PX] for found, truth in pairs]
-    evaluations = []
-    for column, tolerance in enumerate(TOLERANCES_PX):
-        of_images = [scores(row[column]) for row in counted]
-        total = Counts(*(int(n) for n in np.sum([row[column] for row in counted], axis=0)))
-        mean = Scores(
+    areas: list[list[Counts]] = []
+    lines: list[list[Counts]] = []
+    pixels = 0
+    for found, truth in pairs:
+        areas.append([count(found, truth, d) for d in TOLERANCES_PX])
+        thin = centreline(found), centreline(truth)
+        lines.append([count(*thin, d) for d in TOLERANCES_PX])
+        pixels += found.size
+    return tuple(
+        _evaluation(method, d, [row[k] for row in areas], [row[k] for row in lines], pixels)
+        for k, d in enumerate(TOLERANCES_PX)
+    )
+
+
+def _evaluation(
+    method: str, tolerance_px: int, areas: list[Counts], lines: list[Counts], pixels: int
+) -> Evaluation:
+    of_images = [scores(one) for one in areas]
+    length = _sum(lines)
+    return Evaluation(
+        method=method,
+        tolerance_px=tolerance_px,
+        images=len(areas),
+        aggregate=scores(_sum(areas)),
+        mean=Scores(
             precision=float(np.mean([s.precision for s in of_images])),
             recall=float(np.mean([s.recall for s in of_images])),
             f1=float(np.mean([s.f1 for s in of_images])),
-        )
-        evaluations.append(
-            Evaluation(
-                method=method, tolerance_px=tolerance, images=len(counted), aggregate=scores(total), mean=mean
-            )
-        )
-    return tuple(evaluations)
+        ),
+        length=scores(length),
+        f1_interval=_interval(areas),
+        false_length_per_mpx=round((length.found - length.found_right) / (pixels / 1e6), 2),
+    )
+
+
+def _sum(counts: list[Counts]) -> Counts:
+    return Counts(*(int(n) for n in np.sum(counts, axis=0)))
+
+
+def _interval(counts: list[Counts]) -> tuple[float, float]:
+    """2.5th and 97.5th percentile of the aggregate F1 over images drawn with replacement."""
+    drawn = np.random.default_rng(SEED).integers(len(counts), size=(DRAWN_ANEW, len(counts)))
+    f1 = [scores(Counts(*row)).f1 for row in np.asarray(counts)[drawn].sum(axis=1).tolist()]
+    low, high = np.percentile(f1, (2.5, 97.5))
+    return round(float(low), 4), round(float(high), 4)
 
 
 def _dilated(mask: Mask, radius_px: int) -> Mask:

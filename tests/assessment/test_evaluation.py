@@ -42,9 +42,30 @@ def test_nothing_found_and_nothing_there() -> None:
 
 def test_aggregate_weighs_pixels_and_mean_weighs_images() -> None:
     nothing = np.zeros((40, 40), dtype=bool)
-    exact, near = evaluate("hairline", [(line(5, 9), line(5, 9)), (nothing, line(3))])
-    assert (exact.tolerance_px, near.tolerance_px, exact.images) == (0, 2, 2)
+    exact, near, loose = evaluate("hairline", [(line(5, 9), line(5, 9)), (nothing, line(3))])
+    assert (exact.tolerance_px, near.tolerance_px, loose.tolerance_px, exact.images) == (0, 2, 5, 2)
     assert exact.aggregate.recall == pytest.approx(0.9) and exact.mean.recall == pytest.approx(0.5)
+
+
+def test_length_does_not_depend_on_how_wide_a_mask_is_drawn() -> None:
+    """A rim of two pixels costs the area its precision, the centreline nothing."""
+    _, _, loose = evaluate("hairline", [(line(8, 8), line(10, 4))])
+    assert loose.length.precision == loose.length.recall == 1.0
+    wrong, truth = line(10), line(10) | line(30)
+    _, near, _ = evaluate("hairline", [(wrong, truth)])
+    assert (near.length.precision, near.length.recall) == (1.0, pytest.approx(0.5))
+    _, near, _ = evaluate("hairline", [(truth, wrong)])
+    assert near.false_length_per_mpx == pytest.approx(40 / 1600 * 1e6, rel=0.05)
+
+
+def test_the_interval_holds_the_figure_and_narrows_with_more_images() -> None:
+    pairs = [(line(5, 4), line(5, 4)), (line(5), line(20)), (line(7, 2), line(7, 4))]
+    few, many = (evaluate("hairline", pairs * n)[0] for n in (2, 40))
+    for one in (few, many):
+        low, high = one.f1_interval
+        assert low <= one.aggregate.f1 <= high
+    assert np.ptp(many.f1_interval) < 0.5 * np.ptp(few.f1_interval)
+    assert few.f1_interval == evaluate("hairline", pairs * 2)[0].f1_interval
 
 
 @given(arrays(bool, (12, 12)), arrays(bool, (12, 12)), st.integers(0, 4))
