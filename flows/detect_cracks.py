@@ -3,11 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 from typing import Any, TypeVar
 
 from prefect import flow
 
+from artifacts import store
 from flows.collect_images import PhotoSource, collect
+from flows.inspection_file import existing
 from flows.model_structure import has_scans, model
 from flows.opening import opened
 from flows.workers import one_a_core
@@ -49,7 +52,7 @@ class Detected:
 
 
 def detect_in_photos(
-    inspection: Inspection, sources: tuple[PhotoSource, ...], surfaces: tuple[Surface, ...]
+    inspection: Inspection, base: Path, sources: tuple[PhotoSource, ...], surfaces: tuple[Surface, ...]
 ) -> Detected:
     """Stitch each surface's photos, take the markers out, find the cracks and measure them."""
     problems: list[LeftOut] = []
@@ -71,7 +74,8 @@ def detect_in_photos(
     settings = inspection.detect
     if inspection.report.baselines:
         settings = settings.model_copy(update={"baselines": True})
-    found = usable("detection", cleaned, detect.each((m, p, settings) for m, p in cleaned))
+    network = store.current().put(existing(base, settings.model, "detect.model")) if settings.model else None
+    found = usable("detection", cleaned, detect.each((m, p, settings, network) for m, p in cleaned))
     measured = usable("measurement", found, measure.each((m, p, d, inspection.detect) for (m, p), d in found))
     return Detected(tuple(Inspected(m, p, d, cracks) for ((m, p), d), cracks in measured), tuple(problems))
 
@@ -101,4 +105,4 @@ def detect_cracks(inspection: str = "demo:wall", out: str | None = None) -> None
         modelled = model(run.inspection, run.base) if has_scans(run.inspection) else None
         structure = modelled.structure if modelled else None
         collected = collect(run.inspection, run.base, structure, run.save_plan)
-        run.save_detected(detect_in_photos(run.inspection, collected.photos, collected.surfaces))
+        run.save_detected(detect_in_photos(run.inspection, run.base, collected.photos, collected.surfaces))

@@ -21,6 +21,7 @@ from schemas.settings import DetectSettings
 Mask = npt.NDArray[np.bool_]
 ALL = {
     "hairline": DetectSettings(method="hairline"),
+    "ridge": DetectSettings(method="ridge"),
     "paper": DetectSettings(method="paper"),
     "global 125": DetectSettings(method="global", global_threshold=125),
     "global 155": DetectSettings(method="global", global_threshold=155),
@@ -47,12 +48,14 @@ def evaluate(
     out:
         Folder to write to.
     method:
-        Methods to compare. Default: hairline, paper, and global at the paper's thresholds 125 and 155.
+        Methods to compare. Default: hairline, ridge, paper, and global at the paper's thresholds 125 and 155.
     gsd_mm_px:
         Ground sample distance, mm per pixel, where it is known.
     """
     from flows.results import write_json
 
+    if "onnx" in method:
+        raise BadInput("--method onnx", "has no network to try", "Compare its masks: hairline detect --model")
     chosen: dict[str, DetectSettings] = {name: DetectSettings(method=name) for name in method}
     methods = chosen or ALL
     with working(out) as progress:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from schemas.mosaic import Mosaic
     from schemas.settings import DetectSettings
 
-Method = Literal["hairline", "ridge", "paper", "global"]
+Method = Literal["hairline", "ridge", "paper", "global", "onnx"]
 
 
 @app.command
@@ -74,6 +74,8 @@ def detect(
     method: Method = "hairline",
     gsd_mm_px: float | None = None,
     global_threshold: int | None = None,
+    model: Path | None = None,
+    min_score: float = 0.5,
 ) -> None:
     """Find and measure cracks in images as they are: D/NAME.mask.png (0/255) per image, D/cracks.json.
 
@@ -84,26 +86,40 @@ def detect(
     out:
         Folder to write to.
     method:
-        hairline: Sauvola's local thresholds from valid pixels only. paper: the paper's method, step by step.
-        global: one threshold for the whole image.
+        hairline: Hairline's own network. ridge: dark lines on a flattened surface, without any training.
+        paper: the paper's method, step by step. global: one threshold for the whole image. onnx: a network
+        of yours.
     gsd_mm_px:
         Ground sample distance, mm per pixel; without it results are in pixels only.
     global_threshold:
         Grey level of `global`, 1 to 254. Default: from the histogram's peaks.
+    model:
+        ONNX file of `onnx`: (1, 3, H, W) RGB in 0..1 to (1, 1, H, W) logits.
+    min_score:
+        Least probability, 0 to 1, that what a network found is a crack. A lower one finds more and errs more.
     """
     from artifacts.run_folder import lay_out
     from flows.results import write_json
     from schemas.settings import AssessSettings, DetectSettings
     from tasks.assessment.task import assess
 
-    settings = DetectSettings(method=method, global_threshold=global_threshold)
+    if (method == "onnx") != (model is not None):
+        raise BadInput("--model", "goes with --method onnx, and only with it", "Give both or neither")
+    if model is not None and not model.is_file():
+        raise BadInput(str(model), "no such file", "Correct the path")
+    settings = DetectSettings(
+        method=method,
+        global_threshold=global_threshold,
+        model=model.name if model else None,
+        min_score=min_score,
+    )
     seen: list[Detected] = []
     problems: list[BadInput] = []
     paths = photos_in(images)
     with working(out) as progress:
         for number, path in enumerate(paths, start=1):
             try:
-                seen.append(detected(path, settings, gsd_mm_px))
+                seen.append(detected(path, settings, gsd_mm_px, model))
                 name = path.stem if [p.stem for p in paths].count(path.stem) == 1 else path.name
                 lay_out(out, {f"{name}.mask.png": seen[-1].detection.mask}, copy=True)
             except BadInput as problem:
@@ -135,7 +151,9 @@ class Detected:
     measurement: "Measurement"
 
 
-def detected(path: Path, settings: "DetectSettings", gsd_mm_px: float | None) -> Detected:
+def detected(
+    path: Path, settings: "DetectSettings", gsd_mm_px: float | None, model: Path | None = None
+) -> Detected:
     """One image, seen through to its cracks."""
     from artifacts import store
     from schemas.settings import PatternSettings
@@ -148,7 +166,8 @@ def detected(path: Path, settings: "DetectSettings", gsd_mm_px: float | None) ->
     photo = ingest.bare(store.current().put(path), path.name, path.stem, None, None, 5.0)
     mosaic = single.bare(photo, gsd_mm_px)
     patterns = remove_patterns.bare(mosaic, PatternSettings())
-    detection = detect_cracks.bare(mosaic, patterns, settings)
+    network = store.current().put(model) if model else None
+    detection = detect_cracks.bare(mosaic, patterns, settings, network)
     return Detected(mosaic, patterns, detection, measure_cracks.bare(mosaic, patterns, detection, settings))
 
 

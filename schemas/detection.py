@@ -32,4 +32,5 @@ class Detection(Contract):
     crack_px: int
     inspected_px: int
     rejected: tuple[tuple[Vector2, str], ...] = ()  # position in pixels, and why it is no crack
+    scores: tuple[tuple[Vector2, float], ...] = ()  # position, and how likely it is a crack, by a network
     baselines: tuple[tuple[str, File], ...] = ()  # (name, mask) of the global thresholds, where asked for

@@ -1,9 +1,9 @@
 """Every setting of every stage, its default explained on its line."""
 
 import math
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from schemas.box import Box
 from schemas.contract import Contract, Vector2
@@ -13,6 +13,7 @@ class RegistrationSettings(Contract):
     voxel_m: float = Field(default=0.02, gt=0)  # merged model's point spacing; fine for planes of a bridge
     tau_m: float = Field(default=0.10, gt=0)  # paper's τ: points closer than this overlap
     min_overlap: float = Field(default=0.10, gt=0, le=1)  # below this two scans are not tied to each other
+    require_all: bool = False  # a scan that ties to no other ends the run; false: the others go on without it
     seed: int = 0
 
 
@@ -73,7 +74,11 @@ class PatternSettings(Contract):
 
 
 class DetectSettings(Contract):
-    method: Literal["hairline", "ridge", "paper", "global"] = "hairline"
+    method: Literal["hairline", "ridge", "paper", "global", "onnx"] = "hairline"
+    model: str | None = None  # of `onnx`: the network's file, beside the inspection file
+    min_score: float = Field(
+        default=0.5, ge=0, le=1
+    )  # least probability that what a network found is a crack
     window_px: int | None = Field(default=None, ge=3)  # paper's N; cracks up to N/2 wide; None: 63
     k: float = Field(default=0.5, gt=0, lt=1)  # paper; `ridge` lowers it where the surface is smooth
     R: float = Field(default=128.0, gt=0)  # paper
@@ -81,6 +86,12 @@ class DetectSettings(Contract):
     baselines: bool = False  # also the global thresholds 125, 155 and the peaks' own, for the report
     min_length_mm: float = Field(default=50.0, gt=0)  # shorter things are no cracks where a scale is known
     min_length_px: float = Field(default=30.0, gt=0)  # and where none is
+
+    @model_validator(mode="after")
+    def _a_model_for_onnx_alone(self) -> Self:
+        if (self.method == "onnx") != (self.model is not None):
+            raise ValueError("the method onnx needs a model, and no other method takes one")
+        return self
 
 
 class AssessSettings(Contract):

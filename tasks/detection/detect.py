@@ -9,15 +9,18 @@ from schemas.detection import Peaks
 from schemas.raster import ArrayRaster, Pixels, Progress, Raster
 from schemas.settings import DetectSettings
 from tasks.detection.bands import by_bands
-from tasks.detection.components import long_and_thin
+from tasks.detection.candidates import Scored, candidates
+from tasks.detection.components import ELONGATION, long_and_thin
 from tasks.detection.edges import without_soft
 from tasks.detection.global_threshold import PAPER, Histogram, darker_than, from_peaks, otsu
 from tasks.detection.joints import Joint, without_joints
+from tasks.detection.network import Model, our_model, probability
 from tasks.detection.paper import paper_mask
 from tasks.detection.ridge import SEED, Scale, dark_levels
 from tasks.detection.sauvola import Mask, grey_of
 
 WINDOW_PX = 63  # N: best on our development photos (METHOD); holds cracks of up to half of it, 31 px
+WORTH_SAYING = 0.1  # a rejected candidate with a lower score is not worth a line
 JOINT_LENGTHS = 8.0  # what is straight over this many times the least length of a crack is a joint
 
 
@@ -27,6 +30,8 @@ class DetectionArrays:
     inspected_px: int
     joints: tuple[Joint, ...] = ()  # straight lines that are dark but no cracks
     stains: tuple[tuple[float, float], ...] = ()  # where something dark has soft edges, x, y
+    scores: tuple[Scored, ...] = ()  # of the cracks, by a network
+    doubtful: tuple[Scored, ...] = ()  # long enough, but with a score below the settings' least
 
 
 def detect_image(
@@ -35,11 +40,13 @@ def detect_image(
     settings: DetectSettings,
     gsd_mm_px: float | None,
     peaks: Peaks | None = None,
+    model: Model | None = None,
 ) -> DetectionArrays:
     """Cracks of an image in memory. rgb: (H, W, 3) uint8; valid: (H, W), None where all of it is.
 
-    peaks: of the red channel; the methods `paper` and `global` use them where they are known."""
-    return detect_raster(ArrayRaster(rgb, valid), settings, gsd_mm_px, peaks or Peaks())
+    peaks: of the red channel; the methods `paper` and `global` use them where they are known.
+    model: of the method `onnx`."""
+    return detect_raster(ArrayRaster(rgb, valid), settings, gsd_mm_px, peaks or Peaks(), model=model)
 
 
 def detect_raster(
@@ -48,8 +55,12 @@ def detect_raster(
     gsd_mm_px: float | None,
     peaks: Peaks,
     on_progress: Progress | None = None,
+    model: Model | None = None,
 ) -> DetectionArrays:
-    """Cracks of an image of any size, read in bands."""
+    """Cracks of an image of any size, read piece by piece."""
+    least_px = settings.min_length_px if gsd_mm_px is None else settings.min_length_mm / gsd_mm_px
+    if settings.method == "onnx":
+        return _by_network(raster, model or our_model(), settings.min_score, least_px, on_progress)
     window = (settings.window_px or WINDOW_PX) | 1
     if settings.method == "paper":
         mask = paper_mask(raster, peaks, window, settings.k, settings.R, on_progress)
@@ -57,14 +68,32 @@ def detect_raster(
     if settings.method == "global":
         threshold = settings.global_threshold or from_peaks(red_histogram(raster), peaks)
         return DetectionArrays(global_mask(raster, threshold), count_valid(raster))
-    return _ridge(raster, settings, Scale.of_window(window), gsd_mm_px, on_progress)
+    return _ridge(raster, settings, Scale.of_window(window), least_px, on_progress)
+
+
+def _by_network(
+    raster: Raster, model: Model, min_score: float, least_px: float, on_progress: Progress | None
+) -> DetectionArrays:
+    """What a network holds for cracks, long and likely enough as a whole, less what is straight."""
+    given = candidates(probability(raster, model, on_progress))
+    long = (given.found.extent_px >= least_px) & (given.found.elongation >= ELONGATION)
+    likely = given.score >= min_score
+    mask, joints = without_joints(given.found.keep(long & likely), JOINT_LENGTHS * least_px, least_px)
+    mask = long_and_thin(mask.astype(np.uint8), 1, least_px)
+    return DetectionArrays(
+        mask,
+        count_valid(raster),
+        tuple(joints),
+        scores=given.at(given.found.holding(mask)),
+        doubtful=given.at(long & ~likely & (given.score >= WORTH_SAYING)),
+    )
 
 
 def _ridge(
     raster: Raster,
     settings: DetectSettings,
     scale: Scale,
-    gsd_mm_px: float | None,
+    least_px: float,
     on_progress: Progress | None,
 ) -> DetectionArrays:
     levels = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
@@ -79,7 +108,6 @@ def _ridge(
         return int(valid[inner].sum())
 
     inspected = sum(by_bands(raster.height_px, scale.halo, band, on_progress))
-    least_px = settings.min_length_px if gsd_mm_px is None else settings.min_length_mm / gsd_mm_px
     mask = long_and_thin(levels, SEED, least_px)
     mask, stains = without_soft(mask, lit, (levels == 0) & (lit > 0))
     mask, joints = without_joints(mask, JOINT_LENGTHS * least_px, least_px)

@@ -27,17 +27,22 @@ def pages(inputs: Mapping[str, Any], detection: Detection) -> list[Page]:
 
 
 @stage(pages=pages)
-def detect(mosaic: Mosaic, patterns: Patterns, settings: DetectSettings) -> Detection:
+def detect(
+    mosaic: Mosaic, patterns: Patterns, settings: DetectSettings, model: File | None = None
+) -> Detection:
     """Crack pixels by the settings' method; with `baselines` the paper's global thresholds as well.
 
+    model: the network's file where the method is `onnx`.
     The paper's own method looks at all of the image, markers included, and takes them out by t1 and t2."""
     from tasks.detection.detect import baselines, detect_raster
+    from tasks.detection.network import Model
 
     files = store.current()
     taken_out = None if settings.method == "paper" else files.path(patterns.mask)
     image, coverage = files.path(mosaic.image), files.path(mosaic.coverage)
     with MosaicRaster(image, coverage, mosaic.name, taken_out) as raster, files.scratch() as folder:
-        found = detect_raster(raster, settings, mosaic.gsd_mm_px, patterns, progress)
+        guest = Model(files.path(model).read_bytes(), settings.model or "model") if model else None
+        found = detect_raster(raster, settings, mosaic.gsd_mm_px, patterns, progress, guest)
         write_mask(found.mask, folder / "cracks.png")
         mask = files.put(folder / "cracks.png")
         beside = []
@@ -52,7 +57,9 @@ def detect(mosaic: Mosaic, patterns: Patterns, settings: DetectSettings) -> Dete
         rejected=(
             *((joint.position_px, _reason(joint.length_px, mosaic)) for joint in found.joints),
             *((position, "a stain or shadow: its edges are soft") for position in found.stains),
+            *((one.position_px, f"no crack, most likely: score {one.score:.2f}") for one in found.doubtful),
         ),
+        scores=tuple((one.position_px, one.score) for one in found.scores),
         baselines=tuple(beside),
     )
 

@@ -1,0 +1,110 @@
+"""A crack's probability at every pixel, by a small network that OpenCV runs.
+
+Ours lies beside this file (hairline.onnx; hairline.md says what it learned from and how well it does). Any
+other takes its place that has the same ends: (1, 3, H, W) RGB in 0..1 to (1, 1, H, W) logits, for any H and W
+that are multiples of STRIDE.
+"""
+
+import hashlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from schemas.problem import BadInput
+from schemas.raster import Pixels, Progress, Raster
+from tasks.detection.sauvola import Mask
+
+DATA_FILES = ()
+OURS = Path(__file__).with_name("hairline.onnx")
+SHA256 = "0" * 64
+STRIDE = 16
+TILE_PX = 768
+HALO_PX = 96  # what lies further away changes a probability by less than 1/255, but for rare pixels
+FILL_PX = 63  # what is not known is filled from this far around
+
+Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
+
+
+class Model(NamedTuple):
+    content: bytes  # ONNX
+    name: str  # for messages
+
+
+def our_model() -> Model:
+    """The network of this repository. BadInput where its file is missing, cut short or altered."""
+    remedy = f"Restore it: git checkout {OURS.relative_to(OURS.parents[2])}"
+    try:
+        content = OURS.read_bytes()
+    except OSError as problem:
+        raise BadInput(OURS.name, f"cannot be read ({problem.strerror})", remedy) from None
+    if hashlib.sha256(content).hexdigest() != SHA256:
+        raise BadInput(OURS.name, "is not the network that this version ships: altered or cut short", remedy)
+    return Model(content, OURS.name)
+
+
+def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:
+    """(H, W) of the whole image, tile by tile; 0 where nothing is known. BadInput for an unfit network."""
+    net = _read(model)
+    height, width = raster.height_px, raster.width_px
+    whole = np.zeros((height, width), dtype=np.uint8)
+    corners = [(y, x) for y in range(0, height, TILE_PX) for x in range(0, width, TILE_PX)]
+    for done, (y, x) in enumerate(corners, start=1):
+        top, left = max(0, y - HALO_PX), max(0, x - HALO_PX)
+        bottom, right = min(height, y + TILE_PX + HALO_PX), min(width, x + TILE_PX + HALO_PX)
+        valid = raster.valid(top, bottom, left, right)
+        if valid.any():
+            seen = np.where(
+                valid, _forward(net, filled(raster.rgb(top, bottom, left, right), valid), model), 0
+            )
+            inner = seen[y - top : y - top + TILE_PX, x - left : x - left + TILE_PX]
+            whole[y : y + TILE_PX, x : x + TILE_PX] = inner
+        if on_progress is not None:
+            on_progress(done / len(corners))
+    return whole
+
+
+def filled(rgb: Pixels, valid: Mask) -> Pixels:
+    """(H, W, 3): what is not valid takes the mean of what is around it: its rim looks like nothing."""
+    if valid.all():
+        return rgb
+    size = (FILL_PX, FILL_PX)
+    weight = valid.astype(np.float32)
+    known = cv2.boxFilter(weight, -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    summed = cv2.boxFilter(rgb * weight[..., None], -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    far = rgb[valid].mean(axis=0)
+    near = np.where(known[..., None] > 0.5, summed / np.maximum(known, 1.0)[..., None], far)
+    return np.where(valid[..., None], rgb, np.rint(near)).astype(np.uint8)
+
+
+def _read(model: Model) -> Any:
+    try:
+        return cv2.dnn.readNetFromONNX(np.frombuffer(model.content, dtype=np.uint8))
+    except cv2.error as problem:
+        raise _unfit(model, f"cannot be read as an ONNX network ({_first_words(problem)})") from None
+
+
+def _forward(net: Any, rgb: Pixels, model: Model) -> Probability:
+    """255 × the probability at every pixel of one tile."""
+    height, width = rgb.shape[:2]
+    padded = cv2.copyMakeBorder(rgb, 0, -height % STRIDE, 0, -width % STRIDE, cv2.BORDER_REFLECT_101)
+    try:
+        net.setInput(cv2.dnn.blobFromImage(padded, 1.0 / 255.0))
+        logit = np.asarray(net.forward())
+    except cv2.error as problem:
+        raise _unfit(model, f"does not run on a tile of an image ({_first_words(problem)})") from None
+    if logit.shape != (1, 1, *padded.shape[:2]):
+        raise _unfit(model, f"answers a tile of {padded.shape[:2]} px with the shape {logit.shape}")
+    p = 1.0 / (1.0 + np.exp(-np.clip(logit[0, 0, :height, :width], -30.0, 30.0)))
+    return np.asarray(np.rint(255.0 * p), dtype=np.uint8)
+
+
+def _unfit(model: Model, what: str) -> BadInput:
+    remedy = "Give an ONNX file that turns (1, 3, H, W) RGB in 0..1 into (1, 1, H, W) logits"
+    return BadInput(model.name, what, remedy)
+
+
+def _first_words(problem: cv2.error) -> str:
+    return " ".join(str(problem).split())[-120:]
