@@ -59,7 +59,7 @@ def digest_code(module: str) -> dict[str, str]:
 
 @cache
 def _module(name: str) -> tuple[Mapping[str, str], tuple[str, ...]]:
-    """The digests of a module of ours and of its data files, and what it imports; stages share most of them."""
+    """The digests of a module of ours and its data files, and what it imports; stages share most of them."""
     path = _source(name)
     if path is None:
         return {}, ()

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from tasks.lineage import Lineage
+
 Outcome = Literal["started", "progress", "ran", "cached", "failed", "will run"]
 
 
@@ -33,6 +35,7 @@ class Run:
     listener: Callable[[Event], None] = _nobody_listens
     dry: bool = False  # look stages up, run none
     lay_out: bool = True  # give results their readable names in the folder
+    lineage: Lineage = field(default_factory=Lineage)  # of this run's results
     last: dict[str, Any] = field(default_factory=dict)  # "stage/item" → what its key was made of
 
     def record_path(self) -> Path | None:

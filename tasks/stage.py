@@ -36,7 +36,10 @@ from prefect.artifacts import (
 from prefect.cache_policies import CacheKeyFnPolicy
 from prefect.client.schemas.objects import State, TaskRun
 from prefect.context import TaskRunContext
+from prefect.futures import PrefectFuture, PrefectTaskRunFuture
 from prefect.serializers import JSONSerializer, prefect_json_object_decoder
+from prefect.states import Completed
+from prefect.utilities.annotations import quote
 from pydantic import ConfigDict, validate_call
 
 from artifacts import store
@@ -113,7 +116,11 @@ class Stage(Generic[P, R]):
         inputs = self.named_inputs(args, kwargs)
         if run.current().dry:
             return cast(R, self._look_up(inputs))
-        return cast(R, self._stored_task()(**inputs))
+        parents = _parents(inputs)
+        state = self._stored_task()(**_quoted(inputs), wait_for=parents, return_state=True)
+        result = cast(R, state.result())
+        run.current().lineage.leave(result, state.state_details.task_run_id)
+        return result
 
     def each(self, calls: Iterable[Sequence[Any]]) -> list[R | BadInput]:
         """Run once for each tuple of arguments, at the same time; an unusable item gives its BadInput."""
@@ -121,7 +128,7 @@ class Stage(Generic[P, R]):
         if run.current().dry:
             return [cast(R, self._look_up(one)) for one in inputs]
         stored = self._stored_task()
-        futures = [stored.submit(**one) for one in inputs]
+        futures = [stored.submit(**_quoted(one), wait_for=_parents(one)) for one in inputs]
         results: list[R | BadInput] = []
         for future in futures:
             future.wait()
@@ -129,6 +136,7 @@ class Stage(Generic[P, R]):
             if problem is not None and not isinstance(problem, BadInput):
                 raise problem
             results.append(problem or future.result())
+            run.current().lineage.leave(results[-1], future.task_run_id)
         return results
 
     # -- key and cache -------------------------------------------------------------------------------
@@ -207,12 +215,12 @@ class Stage(Generic[P, R]):
 
     def _run_name(self) -> str:
         context = TaskRunContext.get()
-        item = item_name(context.parameters) if context else ""
+        item = item_name(_parameters(context)) if context else ""
         return f"{self.name.replace('_', '-')} {item}".strip()
 
     def _on_completion(self, _task: Task[..., Any], task_run: TaskRun, state: State[Any]) -> None:
         context = TaskRunContext.get()
-        inputs = self.named_inputs((), context.parameters) if context else {}
+        inputs = self.named_inputs((), _parameters(context)) if context else {}
         item = item_name(inputs)
         code, digests = self._key_parts(inputs)
         run.current().last[f"{self.name}/{item}"] = {"code": code, "inputs": digests}
@@ -242,7 +250,7 @@ class Stage(Generic[P, R]):
         context = TaskRunContext.get()
         problem = failure(state)
         detail = str(problem) if isinstance(problem, BadInput) else _one_line(problem)
-        _tell(Event(self.name, "failed", item_name(context.parameters if context else {}), detail=detail))
+        _tell(Event(self.name, "failed", item_name(_parameters(context) if context else {}), detail=detail))
 
 
 def stage(
@@ -270,7 +278,7 @@ def progress(fraction: float) -> None:
         _tell(Event("", "progress", fraction=fraction))
         return
     name = context.task.name.replace("-", "_")
-    _tell(Event(name, "progress", item_name(context.parameters), fraction))
+    _tell(Event(name, "progress", item_name(_parameters(context)), fraction))
     _Progress.of(context).show(fraction)
 
 
@@ -304,6 +312,41 @@ def publish(page: Page) -> None:
         create_link_artifact(page.link, key=page.key, description=page.description)
     else:
         create_table_artifact(page.table, key=page.key, description=page.description)
+
+
+class _Parent(PrefectTaskRunFuture[Any]):
+    """A task run that has ended, as what another waits for: an edge of the graph and nothing else."""
+
+    def __init__(self, task_run_id: UUID) -> None:
+        super().__init__(task_run_id)
+        self._final_state = Completed(data=True)  # Prefect asks every parent for a result
+
+    def wait(self, timeout: float | None = None) -> None:
+        """It has ended."""
+
+    def result(self, timeout: float | None = None, raise_on_failure: bool = True) -> None:
+        """Not told: the result is handed on by the flow."""
+
+    def add_done_callback(self, fn: Callable[[PrefectFuture[Any]], None]) -> None:
+        fn(self)
+
+
+def _parents(inputs: Mapping[str, Any]) -> list[_Parent]:
+    return [_Parent(source) for source in run.current().lineage.enter(list(inputs.values()))]
+
+
+def _quoted(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Inputs that Prefect does not look into: the edges are known (tasks/lineage.py), and looking for them
+    among values would find false ones."""
+    return {name: quote(value) for name, value in inputs.items()}
+
+
+def _parameters(context: TaskRunContext) -> dict[str, Any]:
+    """A task run's inputs, whether Prefect has unquoted them yet or not."""
+    return {
+        name: value.unquote() if isinstance(value, quote) else value
+        for name, value in context.parameters.items()
+    }
 
 
 def decode_verified(decoded: dict[str, Any]) -> Any:

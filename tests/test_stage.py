@@ -8,6 +8,7 @@ import pytest
 from prefect import flow
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
+from prefect.client.schemas.sorting import TaskRunSort
 from pydantic import ValidationError
 
 from artifacts import store
@@ -15,7 +16,7 @@ from schemas.problem import BadInput, LeftOut
 from tasks import run
 from tasks.run import Event, Run
 from tasks.stage import Pending
-from tests.stage_examples import calls, copy_text, flaky, launch, lies, shout
+from tests.stage_examples import calls, copy_text, flaky, join, launch, lies, shout
 
 pytestmark = pytest.mark.usefixtures("prefect_server", "own_store")
 
@@ -143,3 +144,24 @@ def test_a_dry_run_says_why_a_stage_will_run_and_runs_none(tmp_path: Path) -> No
     assert isinstance(unknown, Pending)
     assert [(e.outcome, e.detail) for e in events] == [("will run", "times changed"), ("cached", "")]
     assert not calls
+
+
+def test_the_graph_has_an_edge_where_a_result_went_and_nowhere_else() -> None:
+    common = LeftOut(item="common", stage="none", what="from outside")
+
+    def body() -> list[Any]:
+        first, second = join.each([(name, (common,)) for name in ("ada", "bob")])
+        return [join("both", (first, second)), join("one", (second, common))]
+
+    in_flow(body)
+    with get_client(sync_client=True) as client:
+        runs = {one.name: one for one in client.read_task_runs(sort=TaskRunSort.END_TIME_DESC, limit=4)}
+    names = {one.id: name for name, one in runs.items()}
+
+    def parents(name: str) -> set[str]:
+        edges = [edge for found in runs[name].task_inputs.values() for edge in found]
+        return {names[edge.id] for edge in edges}
+
+    assert parents("join ada") == parents("join bob") == set()
+    assert parents("join both") == {"join ada", "join bob"}
+    assert parents("join one") == {"join bob"}
