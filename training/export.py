@@ -1,6 +1,6 @@
-"""Write trained weights as ONNX: `python -m training.export WEIGHTS.pt MODEL.onnx [TEMPERATURE]`.
+"""Write trained weights as ONNX: `python -m training.export WEIGHTS.pt MODEL.onnx [SLOPE OFFSET]`.
 
-The logits are divided by the temperature, which training.calibrate finds on photos that were held out."""
+The logits are scaled and shifted as training.calibrate asks for, so that they are calibrated."""
 
 import hashlib
 import sys
@@ -12,13 +12,13 @@ import torch
 from training.network import Network
 
 
-def main(weights: Path, model: Path, temperature: float = 1.0) -> None:
+def main(weights: Path, model: Path, slope: float = 1.0, offset: float = 0.0) -> None:
     net = Network()
     net.load_state_dict(torch.load(weights, weights_only=True))
     shape = net.unfold[0]
     with torch.no_grad():
-        shape.weight /= temperature
-        shape.bias /= temperature
+        shape.weight *= slope
+        shape.bias.mul_(slope).add_(offset)
     sides = {"rgb": {2: "height", 3: "width"}, "logit": {2: "height", 3: "width"}}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # PyTorch announces another exporter, which needs two more packages
