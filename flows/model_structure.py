@@ -14,6 +14,7 @@ from schemas.problem import BadInput, LeftOut
 from schemas.registered_model import RegisteredModel
 from schemas.scan import Scan
 from schemas.structure import Structure
+from schemas.target import SeenTarget
 from tasks.registration.task import ingest_scan, register
 from tasks.simulation.task import simulate_scans
 from tasks.surfaces.task import extract
@@ -39,7 +40,7 @@ def has_scans(inspection: Inspection) -> bool:
 def model(inspection: Inspection, base: Path) -> Modelled:
     """Register the scans and find what is flat and what is in the way."""
     scans, unreadable = usable_scans(inspection, base)
-    registered = register(scans, inspection.registration)
+    registered = register(scans, inspection.registration, inspection.targets)
     return Modelled(registered, extract(registered, inspection.surfaces), unreadable)
 
 
@@ -68,7 +69,9 @@ def _ingest_call(given: ScanInput, base: Path) -> tuple[object, ...]:
     path = existing(base, given.file, "scans")
     if not path.is_file():
         raise BadInput(given.file, "is not a file", "Name one scan file per entry of 'scans'")
-    return (store.current().put(path), path.name, METRES[given.unit], given.position_m, given.T_world_scan)
+    seen = tuple(SeenTarget(name=name, position=place) for name, place in given.targets.items())
+    file = store.current().put(path)
+    return (file, path.name, METRES[given.unit], given.position_m, given.T_world_scan, seen)
 
 
 @flow(name="model-structure", description=__doc__, persist_result=False, task_runner=one_a_core())

@@ -18,6 +18,7 @@ from schemas.settings import (
     StitchSettings,
     SurfaceSettings,
 )
+from schemas.target import SiteTarget
 from schemas.vehicle import Vehicle
 
 
@@ -57,6 +58,7 @@ class ScanInput(Contract):
     unit: Literal["m", "mm", "cm", "ft", "in"] = "m"
     position_m: Vector3 | None = None  # of the scanner, in the world
     T_world_scan: Matrix4 | None = None
+    targets: dict[str, Vector3] = Field(default_factory=dict)  # name: centre, in the file's unit
 
 
 class PhotoSet(Contract):
@@ -79,6 +81,9 @@ class Inspection(Contract):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")  # also the folder's name under runs/
     simulation: SimulationInput | None = None  # a rehearsal: scans, vehicle and photos are simulated
     scans: tuple[ScanInput, ...] = ()
+    targets: tuple[
+        SiteTarget, ...
+    ] = ()  # surveyed: control ties the model to the site, check points judge it
     flight: Literal["simulated", "vehicle", "external"] | None = None  # None: no flight
     connection: str | None = None  # of `flight: vehicle`
     mission: str = "1"  # a new id flies again

@@ -2,6 +2,7 @@
 
 from schemas.contract import Contract, Matrix4, Vector3
 from schemas.file import File
+from schemas.target import SeenTarget
 
 
 class Scan(Contract):
@@ -14,3 +15,4 @@ class Scan(Contract):
     unit_m: float = 1.0  # metres per unit of the file's coordinates
     station_position_m: Vector3 | None = None  # scanner position in the world, as measured by the crew
     T_world_scan: Matrix4 | None = None  # full prior pose, where the file or the crew has one
+    targets: tuple[SeenTarget, ...] = ()

@@ -7,7 +7,6 @@ costs a station nothing but time, and cannot sink the others.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,23 +27,16 @@ SEARCH_POINTS = 1500
 REACH = 4.0  # coarse voxels
 
 
-@dataclass(frozen=True)
-class Placed:
-    """Stations of one connected component, by index, in the frame of the first one."""
-
-    T_frame_local: dict[int, Array]
-
-
 def place(
     sites: Sequence[Site],
     shapes: Sequence[Shape],
     voxel_m: float,
     min_overlap: float,
     on_progress: Callable[[float], None],
-) -> list[Placed]:
-    """All components, the one with the most stations first."""
+) -> dict[int, Array]:
+    """T_frame_local of the largest connected component's stations, by index, in the frame of the first."""
     left = list(range(len(sites)))
-    components = []
+    components: list[dict[int, Array]] = []
     while left:
         grown = _Growing(sites, shapes, voxel_m, min_overlap, left[0])
         waiting = grown.nearest_first(left[1:])
@@ -57,9 +49,9 @@ def place(
                 on_progress(len(grown.T) / len(sites))
             else:
                 refused.append(candidate)
-        components.append(Placed(grown.T))
+        components.append(grown.T)
         left = sorted(refused)
-    return sorted(components, key=lambda c: -len(c.T_frame_local))
+    return max(components, key=len)
 
 
 class _Growing:
@@ -112,7 +104,7 @@ class _Growing:
         return True
 
     def _as_stated(self, candidate: int, T: Array) -> bool:
-        """Whether the candidate came to stand where it was measured: two witnesses, and neither saw the search."""
+        """Whether the candidate came to stand where it was measured."""
         site, T_frame_world = self.sites[candidate], self._frame_of_world()
         if site.position_m is None or site.scanner_m is None or T_frame_world is None:
             return False

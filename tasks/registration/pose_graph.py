@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tasks.registration.rigid_motion import Array, adjoint, exp, inverse, log, orthonormal
+from tasks.registration.rigid_motion import Array, adjoint, exp, inverse, log, orthonormal, pose
 
 ITERATIONS = 50
 LEAST_SCALE_M = 0.003  # pairs that contradict the rest by less are all kept
@@ -18,6 +18,7 @@ class Edge:
     T_target_source: Array
     information: Array  # (6, 6), ξ on the left in the target's frame; ξᵀ(information)ξ / inliers is m²
     inliers: int
+    rmse_m: float  # of the inliers
 
 
 def optimise(T_start: Sequence[Array], edges: Sequence[Edge]) -> tuple[list[Array], list[float]]:
@@ -33,23 +34,7 @@ def optimise(T_start: Sequence[Array], edges: Sequence[Edge]) -> tuple[list[Arra
     T = list(T_start)
     mean_inliers = float(np.mean([edge.inliers for edge in edges])) if edges else 1.0
     for _ in range(ITERATIONS if len(T) > 1 else 0):
-        errors = [_error(T, edge) for edge in edges]
-        apart_m = np.array([_apart_m(e, edge) for e, edge in zip(errors, edges, strict=True)])
-        scale_m = max(3 * float(np.median(apart_m)), LEAST_SCALE_M)
-        weights = (scale_m**2 / (scale_m**2 + apart_m**2)) ** 2
-        A = np.zeros((6 * len(T), 6 * len(T)))
-        b = np.zeros(6 * len(T))
-        for e, edge, weight in zip(errors, edges, weights, strict=True):
-            J = adjoint(inverse(T[edge.target]))
-            H = J.T @ edge.information @ J * (weight / mean_inliers)
-            g = J.T @ edge.information @ e * (weight / mean_inliers)
-            i, j = slice(6 * edge.target, 6 * edge.target + 6), slice(6 * edge.source, 6 * edge.source + 6)
-            A[i, i] += H
-            A[j, j] += H
-            A[i, j] -= H
-            A[j, i] -= H
-            b[i] += g
-            b[j] -= g
+        A, b, _ = _normal_equations(T, edges, mean_inliers)
         free = slice(6, None)
         damping = 1e-9 * float(np.trace(A)) / len(A)
         step = np.asarray(np.linalg.solve(A[free, free] + damping * np.eye(len(A) - 6), b[free])).reshape(
@@ -60,6 +45,44 @@ def optimise(T_start: Sequence[Array], edges: Sequence[Edge]) -> tuple[list[Arra
         if np.abs(step).max() < 1e-9:
             break
     return T, [_apart_m(_error(T, edge), edge) for edge in edges]
+
+
+def covariances(
+    T_frame_station: Sequence[Array], edges: Sequence[Edge], scanner_m: Sequence[Array]
+) -> list[Array]:
+    """(6, 6) of each station: turn (radians) and shift (metres) of its scanner (at (3,) `scanner_m`,
+    about the frame's axes), relative to all stations together (a free network: none is fixed).
+
+    The variance of a pair's distances is the larger of what the loops close to (of unit weight a posteriori)
+    and what the pairs leave. Points of one surface share their errors, so that the loops say more. Only one
+    station: zeros.
+    """
+    n = len(T_frame_station)
+    if n == 1:
+        return [np.zeros((6, 6))]
+    A, _, square = _normal_equations(T_frame_station, edges, 1.0)
+    redundant = 6 * (len(edges) - n + 1)
+    variance_m2 = float(np.mean([edge.rmse_m**2 for edge in edges]))
+    if redundant:
+        variance_m2 = max(variance_m2, square / redundant)
+    free = slice(6, None)
+    C = np.zeros_like(A)
+    C[free, free] = variance_m2 * np.linalg.inv(
+        A[free, free] + 1e-12 * np.trace(A) / len(A) * np.eye(6 * n - 6)
+    )
+    to_scanner = np.zeros_like(A)
+    common = np.zeros((6 * n, 6))  # how all stations move together
+    weight = np.zeros(6 * n)
+    centre_m = np.mean(scanner_m, axis=0)
+    size_m = max(1.0, float(np.linalg.norm(np.array(scanner_m) - centre_m, axis=1).mean()))
+    for k, place_m in enumerate(scanner_m):
+        at = slice(6 * k, 6 * k + 6)
+        to_scanner[at, at] = common[at] = adjoint(pose(np.eye(3), -place_m))
+        weight[at] = np.array([size_m**2] * 3 + [1.0] * 3)
+    weighted = common.T * weight
+    spread = np.eye(6 * n) - common @ np.linalg.solve(weighted @ common, weighted)
+    C = spread @ to_scanner @ C @ to_scanner.T @ spread.T
+    return [C[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] for k in range(n)]
 
 
 def spanning_start(stations: int, edges: Sequence[Edge]) -> list[Array]:
@@ -87,6 +110,30 @@ def component(start: int, edges: Sequence[Edge]) -> set[int]:
         if not more:
             return reached
         reached |= more
+
+
+def _normal_equations(T: Sequence[Array], edges: Sequence[Edge], unit: float) -> tuple[Array, Array, float]:
+    """(6n, 6n) and (6n,) for ξ on the left of each pose, information in `unit`s; weighted sum of squares."""
+    errors = [_error(T, edge) for edge in edges]
+    apart_m = np.array([_apart_m(e, edge) for e, edge in zip(errors, edges, strict=True)])
+    scale_m = max(3 * float(np.median(apart_m)), LEAST_SCALE_M)
+    weights = (scale_m**2 / (scale_m**2 + apart_m**2)) ** 2
+    A = np.zeros((6 * len(T), 6 * len(T)))
+    b = np.zeros(6 * len(T))
+    square = 0.0
+    for e, edge, weight in zip(errors, edges, weights, strict=True):
+        J = adjoint(inverse(T[edge.target]))
+        H = J.T @ edge.information @ J * (weight / unit)
+        g = J.T @ edge.information @ e * (weight / unit)
+        square += float(e @ edge.information @ e) * weight / unit
+        i, j = slice(6 * edge.target, 6 * edge.target + 6), slice(6 * edge.source, 6 * edge.source + 6)
+        A[i, i] += H
+        A[j, j] += H
+        A[i, j] -= H
+        A[j, i] -= H
+        b[i] += g
+        b[j] -= g
+    return A, b, square
 
 
 def _error(T: Sequence[Array], edge: Edge) -> Array:

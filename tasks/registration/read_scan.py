@@ -1,5 +1,6 @@
-"""One scan of a file of any known format, checked, in metres."""
+"""One scan of a file of any known format, checked, in metres, block by block."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -27,12 +28,15 @@ UNITS_M = {
 TYPICAL_EXTENT_M = 60.0
 
 
+SAMPLED = 10_000  # points of a block by which the extent is judged
+
+
 @dataclass(frozen=True)
 class LoadedScan:
-    """A scan in metres. Its file's coordinates are `points_m + origin_m`."""
+    """A scan, or a block of one, in metres. Its file's coordinates are `points_m + origin_m`."""
 
     points_m: Array  # (N, 3) float64, finite
-    normals: Array | None  # (N, 3) unit, as the file has them
+    normals: Array | None  # (N, 3) unit, as the file has them; zeros where it has none
     T_world_scan: Array | None  # (4, 4), maps points_m to the file's world, where the file states a pose
     viewpoint_m: Array | None  # (3,) scanner in the frame of points_m; None: not known
     origin_m: Array  # (3,) taken off large coordinates (UTM); zeros for others
@@ -56,37 +60,71 @@ def stated_unit_m(path: Path, name: str | None = None) -> float | None:
         return las.stated_unit_m(path)
 
 
-def read_scan(path: Path, index: int = 0, unit_m: float = 1.0, name: str | None = None) -> LoadedScan:
-    """Read scan number `index` (from 0). Points that are NaN, infinite or off the Earth are dropped.
+def scan_blocks(
+    path: Path, index: int = 0, unit_m: float = 1.0, name: str | None = None
+) -> Iterator[LoadedScan]:
+    """Scan number `index` (from 0) in blocks of at most a million points; none is empty.
 
-    Coordinates beyond 1 km (UTM) lose a rounded origin, so that float32 keeps them exact later on.
-    Raises BadInput under `name` for a file that cannot be read, is cut short, holds no finite point, or
-    whose extent no structure has: 40 km or 40 mm say that the unit is not the stated one.
+    Points that are NaN, infinite or off the Earth are dropped. Coordinates beyond 1 km (UTM) lose a rounded
+    origin, the same in all blocks, so that float32 keeps them exact later on. Raises BadInput under `name`
+    for a file that cannot be read, is cut short, holds no finite point, or, after the last block, whose
+    extent no structure has: 40 km or 40 mm say that the unit is not the stated one.
     """
     name = name or path.name
-    with _BadInputOf(name), np.errstate(all="ignore"):  # damaged bytes make odd floats
-        scan: FileScan = _reader(path, name).read(path, index)
-    if len(scan.points) == 0:
+    origin_m: Array | None = None
+    samples: list[Array] = []
+    empty = True
+    with _BadInputOf(name):
+        for scan in _reader(path, name).read(path, index):
+            empty = empty and len(scan.points) == 0
+            with np.errstate(all="ignore"):  # damaged bytes make odd floats
+                finite = np.asarray((np.abs(scan.points) < FARTHEST_M / unit_m).all(axis=1))  # NaN is not
+            if not finite.any():
+                continue
+            points_m = scan.points[finite] * unit_m
+            if origin_m is None:
+                middle_m = np.median(points_m, axis=0)
+                origin_m = np.where(np.abs(middle_m) > LARGE_COORDINATE_M, np.round(middle_m, -2), 0.0)
+            samples.append(points_m[:: max(1, len(scan.points) // SAMPLED)])
+            yield LoadedScan(
+                points_m - origin_m,
+                _unit_normals(scan.normals, finite),
+                _pose_of_shifted(scan, unit_m, origin_m),
+                _viewpoint(scan, unit_m, origin_m),
+                origin_m,
+            )
+    if empty:
         raise BadInput(name, "it holds no points", "Export the scan again and check that it has points.")
-    finite = np.asarray((np.abs(scan.points) < FARTHEST_M / unit_m).all(axis=1))  # NaN is not either
-    if not finite.any():
+    if not samples:
         raise BadInput(name, "none of its points is finite (NaN)", "Export the scan again.")
-    points_m = scan.points[finite] * unit_m
-    _check_extent(points_m, unit_m, name)
-    middle_m = np.median(points_m, axis=0)
-    origin_m = np.where(np.abs(middle_m) > LARGE_COORDINATE_M, np.round(middle_m, -2), 0.0)
-    T_world_scan = None
-    if scan.T_world_scan is not None:
-        T_world_scan = scan.T_world_scan.copy()
-        T_world_scan[:3, 3] = T_world_scan[:3, 3] * unit_m + T_world_scan[:3, :3] @ origin_m
-    viewpoint_m = None
-    if scan.viewpoint is not None and scan.viewpoint.any():
-        viewpoint_m = scan.viewpoint * unit_m - origin_m
-    elif not origin_m.any():
-        viewpoint_m = np.zeros(3)  # a scanner's own frame starts at the scanner
+    _check_extent(np.concatenate(samples), unit_m, name)
+
+
+def read_scan(path: Path, index: int = 0, unit_m: float = 1.0, name: str | None = None) -> LoadedScan:
+    """All blocks of a scan as one, for clouds that fit into memory."""
+    blocks = list(scan_blocks(path, index, unit_m, name))
+    normals = [b.normals for b in blocks if b.normals is not None]
     return LoadedScan(
-        points_m - origin_m, _unit_normals(scan.normals, finite), T_world_scan, viewpoint_m, origin_m
+        np.concatenate([b.points_m for b in blocks]),
+        np.concatenate(normals) if len(normals) == len(blocks) else None,
+        blocks[0].T_world_scan,
+        blocks[0].viewpoint_m,
+        blocks[0].origin_m,
     )
+
+
+def _pose_of_shifted(scan: FileScan, unit_m: float, origin_m: Array) -> Array | None:
+    if scan.T_world_scan is None:
+        return None
+    T_world_scan = scan.T_world_scan.copy()
+    T_world_scan[:3, 3] = T_world_scan[:3, 3] * unit_m + T_world_scan[:3, :3] @ origin_m
+    return T_world_scan
+
+
+def _viewpoint(scan: FileScan, unit_m: float, origin_m: Array) -> Array | None:
+    if scan.viewpoint is not None and scan.viewpoint.any():
+        return np.asarray(scan.viewpoint * unit_m - origin_m)
+    return None if origin_m.any() else np.zeros(3)  # a scanner's own frame starts at the scanner
 
 
 def _reader(path: Path, name: str) -> ModuleType:
@@ -136,11 +174,12 @@ def _check_extent(points_m: Array, unit_m: float, name: str) -> None:
 
 
 def _unit_normals(normals: Array | None, finite: npt.NDArray[np.bool_]) -> Array | None:
+    """None for columns of zeros, as some programs write them."""
     if normals is None:
         return None
     kept = normals[finite]
     length = np.linalg.norm(kept, axis=1, keepdims=True)
     usable = np.isfinite(length) & (length > 1e-6)
-    if usable.mean() < 0.99:  # columns of zeros, as some programs write them
+    if usable.mean() < 0.99:
         return None
     return np.asarray(np.where(usable, kept / np.where(usable, length, 1.0), 0.0))

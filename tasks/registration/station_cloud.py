@@ -1,5 +1,6 @@
 """A station made ready for registration: its cloud at equal density with normals, at two resolutions."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from tasks.registration.read_scan import LoadedScan
 from tasks.registration.rigid_motion import Array
-from tasks.registration.voxel_grid import group_means, unit, voxel_groups
+from tasks.registration.voxel_grid import Accumulator, unit, voxel_keys, voxel_sums
 
 Floats = npt.NDArray[np.float32]
 NEIGHBOURS = 20  # of a normal
@@ -43,20 +44,37 @@ class Cloud:
         return Cloud(self.points_m[chosen], self.normals[chosen])
 
 
-def fine_cloud(scan: LoadedScan, voxel_m: float) -> Cloud:
-    """The scan at one point per voxel; normals from the file, else of the plane through the neighbours."""
-    groups = voxel_groups(scan.points_m, voxel_m)
-    points_m = group_means(scan.points_m, groups)
-    if scan.normals is not None:
-        normals = unit(group_means(scan.normals, groups))
-        return Cloud(points_m.astype(np.float32), normals.astype(np.float32))
-    normals = estimated_normals(points_m)
-    scanner_m = scan.viewpoint_m
+def fine_cloud(blocks: Iterable[LoadedScan], voxel_m: float) -> tuple[Cloud, LoadedScan, int]:
+    """The scan at one point per voxel, its first block, its number of points. Normals are the file's, else
+    those of the plane through the neighbours. No more of the scan than a block is in memory."""
+    first: LoadedScan | None = None
+    total = Accumulator()
+    points = 0
+    for block in blocks:
+        first = first or block
+        points += len(block.points_m)
+        values = block.points_m
+        if first.normals is not None:
+            none = np.zeros_like(values)
+            values = np.hstack([values, none if block.normals is None else block.normals])
+        total.add(voxel_sums(voxel_keys(block.points_m, voxel_m), values))
+    assert first is not None, "a scan has at least one block"
+    means = total.total().means
+    points_m, stated = means[:, :3], unit(means[:, 3:])
+    if stated.any(axis=1).mean() > 0.99:
+        normals = stated
+    else:
+        normals = _towards(estimated_normals(points_m), points_m, first.viewpoint_m)
+    return Cloud(points_m.astype(np.float32), normals.astype(np.float32)), first, points
+
+
+def _towards(normals: Array, points_m: Array, scanner_m: Array | None) -> Array:
+    """(N, 3) the normals turned to the scanner, upwards where it is not known."""
     if scanner_m is None:
         scanner_m = points_m.mean(axis=0) + np.array([0.0, 0.0, FROM_ABOVE_M])
     away = np.einsum("ij,ij->i", normals, scanner_m - points_m) < 0
     normals[away] *= -1
-    return Cloud(points_m.astype(np.float32), normals.astype(np.float32))
+    return normals
 
 
 def estimated_normals(points_m: Array) -> Array:
@@ -68,24 +86,20 @@ def estimated_normals(points_m: Array) -> Array:
     return normals
 
 
-def coarse_voxel_m(clouds: list[Cloud]) -> float:
-    """The spacing at which a median station keeps about COARSE_POINTS points."""
-    sizes = []
-    for cloud in clouds:
-        some = cloud.points_m[:: max(1, len(cloud) // 50_000)]
-        voxel_m = 0.05
-        while voxel_m < 5.0 and voxel_groups(some, voxel_m).max() + 1 > COARSE_POINTS:
-            voxel_m *= 1.25
-        sizes.append(voxel_m)
-    return float(np.median(sizes))
+def coarse_voxel_m(cloud: Cloud) -> float:
+    """The spacing at which the cloud keeps about COARSE_POINTS points."""
+    some = cloud.points_m[:: max(1, len(cloud) // 50_000)]
+    voxel_m = 0.05
+    while voxel_m < 5.0 and len(np.unique(voxel_keys(some, voxel_m))) > COARSE_POINTS:
+        voxel_m *= 1.25
+    return voxel_m
 
 
 def coarse_cloud(fine: Cloud, voxel_m: float) -> Cloud:
     """Voxel means of points and normals; opposite faces of a thin part do not mix."""
-    groups = voxel_groups(fine.points_m, voxel_m, facing(fine.normals))
-    points_m = group_means(fine.points_m, groups)
-    normals = unit(group_means(fine.normals, groups))
-    return Cloud(points_m.astype(np.float32), normals.astype(np.float32))
+    keys = voxel_keys(fine.points_m, voxel_m, facing(fine.normals))
+    means = voxel_sums(keys, np.hstack([fine.points_m, fine.normals])).means
+    return Cloud(means[:, :3].astype(np.float32), unit(means[:, 3:]).astype(np.float32))
 
 
 def facing(normals: npt.NDArray[np.floating]) -> npt.NDArray[np.int64]:

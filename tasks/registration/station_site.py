@@ -1,5 +1,6 @@
 """A station as registration sees it: its clouds, what its scanner saw, and what the crew knew of its pose."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,10 +9,11 @@ import numpy as np
 from schemas.problem import BadInput
 from schemas.scan import Scan
 from tasks.registration import visibility
+from tasks.registration.cloud_shelf import Shelf, Shelved
 from tasks.registration.feature_match import Features, shape_features
 from tasks.registration.read_scan import LoadedScan
 from tasks.registration.rigid_motion import Array, inverse, pose, transform
-from tasks.registration.station_cloud import Cloud, coarse_cloud, fine_cloud
+from tasks.registration.station_cloud import Cloud, coarse_cloud, coarse_voxel_m, fine_cloud
 
 LEAST_POINTS = 100  # fewer, at equal density, are no scan of a structure
 FEATURE_RADII = 5  # coarse voxels
@@ -22,12 +24,14 @@ class Site:
     """Frames: `scan` is the file's (metres), `local` the file's minus `shift_m` (kept small)."""
 
     name: str
-    fine: Cloud  # local frame
+    fine: Shelved  # local frame
+    coarse_voxel_m: float  # at which its shape has about the right number of points
     scanner_m: Array | None  # (3,) local
     shift_m: Array  # (3,) local + shift = scan
     prior_T_world_local: Array | None  # as stated by the crew or the file; to be verified
     position_m: Array | None  # (3,) measured scanner position in the world
     points: int
+    targets_m: dict[str, Array]  # (3,) local, by name
 
 
 @dataclass(frozen=True)
@@ -45,9 +49,10 @@ class Shape:
         return shape_features(self.cloud, FEATURE_RADII * self.voxel_m)
 
 
-def site(scan: Scan, loaded: LoadedScan, voxel_m: float) -> Site:
-    """Raises BadInput where nothing can be registered by so few points."""
-    fine = fine_cloud(loaded, voxel_m)
+def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf) -> Site:
+    """The station of a scan that arrives in blocks, its cloud on the shelf. Raises BadInput where nothing can
+    be registered by so few points."""
+    fine, loaded, points = fine_cloud(blocks, voxel_m)
     if len(fine) < LEAST_POINTS:
         raise BadInput(
             scan.name,
@@ -67,13 +72,24 @@ def site(scan: Scan, loaded: LoadedScan, voxel_m: float) -> Site:
             scanner_m = transform(inverse(prior), position_m[None])[0]
     elif prior is not None and scanner_m is not None:
         position_m = transform(prior, scanner_m[None])[0]
-    return Site(scan.name, fine, scanner_m, loaded.origin_m, prior, position_m, len(loaded.points_m))
+    return Site(
+        name=scan.name,
+        fine=shelf.put(fine),
+        coarse_voxel_m=coarse_voxel_m(fine),
+        scanner_m=scanner_m,
+        shift_m=loaded.origin_m,
+        prior_T_world_local=prior,
+        position_m=position_m,
+        points=points,
+        targets_m={t.name: np.array(t.position) * scan.unit_m - loaded.origin_m for t in scan.targets},
+    )
 
 
 def shape(site: Site, voxel_m: float) -> Shape:
+    fine = site.fine.cloud()
     return Shape(
-        coarse_cloud(site.fine, voxel_m),
+        coarse_cloud(fine, voxel_m),
         voxel_m,
-        coarse_cloud(site.fine, voxel_m / 4),
-        visibility.range_image(site.fine, site.scanner_m),
+        coarse_cloud(fine, voxel_m / 4),
+        visibility.range_image(fine, site.scanner_m),
     )

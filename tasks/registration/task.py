@@ -13,12 +13,20 @@ from schemas.problem import BadInput
 from schemas.registered_model import RegisteredModel
 from schemas.scan import Scan
 from schemas.settings import RegistrationSettings
+from schemas.target import SeenTarget, SiteTarget, TargetResidual
 from tasks.stage import progress, stage
+
+AXES = ("east", "north", "up")
 
 
 @stage()
 def ingest_scan(
-    file: File, name: str, unit_m: float, station_position_m: Vector3 | None, T_world_scan: Matrix4 | None
+    file: File,
+    name: str,
+    unit_m: float,
+    station_position_m: Vector3 | None,
+    T_world_scan: Matrix4 | None,
+    targets: tuple[SeenTarget, ...] = (),
 ) -> tuple[Scan, ...]:
     """Check a scan file. A file with several scans gives several, `NAME-1`, `NAME-2`…; one of them that is
     unusable stays among them, to be left out by name in `register`.
@@ -26,14 +34,14 @@ def ingest_scan(
     unit_m: metres per unit of the file's coordinates; where it is 1 and the file itself states another
     (LAS, LAZ), the file's holds. BadInput where no scan of the file can be used.
     """
-    from tasks.registration.read_scan import read_scan, scan_count, stated_unit_m
+    from tasks.registration.read_scan import scan_blocks, scan_count, stated_unit_m
 
     path = store.current().path(file)
     count = scan_count(path, name)
-    if count > 1 and (station_position_m is not None or T_world_scan is not None):
+    if count > 1 and (station_position_m is not None or T_world_scan is not None or targets):
         raise BadInput(
             name,
-            f"one position is stated for its {count} scans",
+            f"{'targets are' if targets else 'one position is'} stated for its {count} scans",
             "Leave it out, so that the file's own poses count, or split the file.",
         )
     if unit_m == 1.0:
@@ -46,6 +54,7 @@ def ingest_scan(
             unit_m=unit_m,
             station_position_m=station_position_m,
             T_world_scan=T_world_scan,
+            targets=targets,
         )
         for index in range(count)
     )
@@ -53,7 +62,8 @@ def ingest_scan(
     problem = None
     for scan in scans:
         try:
-            read_scan(path, scan.index, scan.unit_m, scan.name)
+            for _ in scan_blocks(path, scan.index, scan.unit_m, scan.name):
+                pass
             usable += 1
         except BadInput as bad:
             problem = problem or bad
@@ -69,7 +79,17 @@ def pages(inputs: Mapping[str, Any], model: RegisteredModel) -> list[Page]:
     title = f"### {len(model.stations)} stations, {model.points:,} points"
     left_out = "".join(f"\n- left out: **{one.item}**, {one.what}" for one in model.left_out)
     picture = markdown_of(draw_model(model, points_m, station), "the model, coloured by station")
-    rows = [
+    shown = [Page(key="registered-model", markdown=f"{title}\n{_of_targets(model)}{left_out}\n\n{picture}")]
+    stations = [
+        {
+            "station": one.name,
+            "points": one.points,
+            "sigma_mm": None if one.sigma_mm is None else round(one.sigma_mm, 2),
+            "sigma_deg": None if one.sigma_deg is None else round(one.sigma_deg, 4),
+        }
+        for one in model.stations
+    ]
+    pairs = [
         {
             "source": pair.source,
             "target": pair.target,
@@ -79,28 +99,54 @@ def pages(inputs: Mapping[str, Any], model: RegisteredModel) -> list[Page]:
         }
         for pair in model.pairs
     ]
-    shown = [Page(key="registered-model", markdown=f"{title}\n{left_out}\n\n{picture}")]
-    return [*shown, Page(key="registered-pairs", table=rows)] if rows else shown
+    targets = [
+        {"target": one.name, "station": one.station, "role": _role(one)}
+        | {f"{axis}_mm": round(1000 * x, 1) for axis, x in zip(AXES, one.residual_m, strict=True)}
+        for one in model.targets
+    ]
+    tables: dict[str, list[dict[str, Any]]] = {"stations": stations, "pairs": pairs, "targets": targets}
+    return shown + [Page(key=f"registered-{key}", table=rows) for key, rows in tables.items() if rows]
+
+
+def _of_targets(model: RegisteredModel) -> str:
+    """One line on how well the model lies in the site's datum."""
+    kinds = (("control targets, fitted to", model.control_rmse_m), ("check points", model.check_rmse_m))
+    said = [f"{kind}: {1000 * rmse_m:.1f} mm RMSE" for kind, rmse_m in kinds if rmse_m is not None]
+    return f"\n{'; '.join(said)}\n" if said else ""
+
+
+def _role(one: TargetResidual) -> str:
+    return "check" if one.check else "control" if one.used else "control, not used"
 
 
 @stage(pages=pages)
-def register(scans: tuple[Scan, ...], settings: RegistrationSettings) -> RegisteredModel:
-    """Tie the scans together in one world frame and merge them into one cloud."""
-    from tasks.registration.merged_model import write_model
+def register(
+    scans: tuple[Scan, ...], settings: RegistrationSettings, targets: tuple[SiteTarget, ...] = ()
+) -> RegisteredModel:
+    """Tie the scans together in one world frame and merge them into one cloud.
+
+    targets: surveyed in the site's datum, which control targets make the model's world frame.
+    """
     from tasks.registration.register import register as register_scans
 
     here = store.current()
-    found = register_scans([(scan, here.path(scan.file)) for scan in scans], settings, progress)
-    low_m, high_m = found.model.points_m.min(axis=0), found.model.points_m.max(axis=0)
     with here.scratch() as folder:
-        write_model(found.model, folder / "model.ply")
-        cloud = here.put(folder / "model.ply")
+        found = register_scans(
+            [(scan, here.path(scan.file)) for scan in scans],
+            settings,
+            folder / "model.ply",
+            targets,
+            progress,
+        )
+        cloud = here.put(found.model.path)
+    low_m, high_m = found.model.low_m, found.model.high_m
     return RegisteredModel(
         cloud=cloud,
         origin_m=(float(found.origin_m[0]), float(found.origin_m[1]), float(found.origin_m[2])),
         stations=found.stations,
         pairs=found.pairs,
-        points=len(found.model.points_m),
+        targets=found.targets,
+        points=found.model.points,
         min_m=(float(low_m[0]), float(low_m[1]), float(low_m[2])),
         max_m=(float(high_m[0]), float(high_m[1]), float(high_m[2])),
         left_out=found.left_out,

@@ -37,7 +37,7 @@ def fit(
     hypotheses = [prior @ inverse(T_frame_local[i]) for i, prior in posed]
     for k, (frame_k, world_k) in enumerate(measured):
         for frame_l, world_l in measured[:k]:
-            two = _fit_yaw(np.array([frame_l, frame_k]), np.array([world_l, world_k]))
+            two = fit_yaw(np.array([frame_l, frame_k]), np.array([world_l, world_k]))
             if two is not None:
                 hypotheses.append(two)
     if not hypotheses:
@@ -53,7 +53,7 @@ def fit(
     near = [(f, w) for f, w in measured if np.linalg.norm(transform(best, f[None])[0] - w) < AGREE_M]
     if len(near) >= 2:
         frame_m = transform(best, np.array([f for f, _ in near]))
-        correction = _fit_yaw(frame_m, np.array([w for _, w in near]))
+        correction = fit_yaw(frame_m, np.array([w for _, w in near]))
         if correction is not None:
             best = correction @ best
     return best
@@ -77,7 +77,7 @@ def levelled(T_frame_local: Sequence[Array]) -> Array:
     return pose(np.eye(3) + W + W @ W / (1 + up[2]), np.zeros(3))
 
 
-def _fit_yaw(frame_m: Array, world_m: Array) -> Array | None:
+def fit_yaw(frame_m: Array, world_m: Array) -> Array | None:
     """Least squares in yaw and shift of (N, 3) positions; None where they stand too close together."""
     frame_mean, world_mean = frame_m.mean(axis=0), world_m.mean(axis=0)
     f, w = frame_m - frame_mean, world_m - world_mean

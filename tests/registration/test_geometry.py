@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tasks.registration import world_frame
+from artifacts.cloud_sample import cloud_sample
+from tasks.registration import cloud_shelf, world_frame
+from tasks.registration.cloud_shelf import Shelf
 from tasks.registration.icp import align
-from tasks.registration.merged_model import merge, write_model
+from tasks.registration.merged_model import merge
 from tasks.registration.overlap import overlapping
 from tasks.registration.pose_graph import Edge, optimise, spanning_start
 from tasks.registration.read_scan import read_scan
@@ -26,7 +28,7 @@ from tasks.registration.rigid_motion import (
     yaw,
 )
 from tasks.registration.station_cloud import Cloud
-from tasks.registration.voxel_grid import group_means, voxel_groups
+from tasks.registration.voxel_grid import Accumulator, voxel_keys, voxel_sums
 
 small = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
 
@@ -49,9 +51,22 @@ def test_fit_finds_the_motion() -> None:
 def test_voxel_means_do_not_depend_on_order() -> None:
     points = np.random.default_rng(0).uniform(-2, 2, (500, 3))
     order = np.random.default_rng(1).permutation(500)
-    means = group_means(points, voxel_groups(points, 0.5))
-    assert np.allclose(means, group_means(points[order], voxel_groups(points[order], 0.5)))
+    means = voxel_sums(voxel_keys(points, 0.5), points).means
     assert len(means) == len(np.unique(np.floor(points / 0.5), axis=0))
+    block_by_block = Accumulator()
+    for block in np.array_split(points[order], 7):
+        block_by_block.add(voxel_sums(voxel_keys(block, 0.5), block))
+    total = block_by_block.total()
+    assert np.allclose(means, total.means)
+    assert total.counts.sum() == 500
+    assert np.array_equal(np.floor(means / 0.5), np.unique(np.floor(points / 0.5), axis=0))
+
+
+def test_a_stray_point_far_away_joins_no_voxel() -> None:
+    keys = voxel_keys(np.array([[0.0, 0.0, 0.0], [1e8, 0.0, 0.0], [0.0, -1e7, 0.0]]), 0.02)
+    assert keys[0] > 0
+    assert keys[1:].tolist() == [-1, -1]
+    assert len(voxel_sums(keys, np.zeros((3, 3))).keys) == 1
 
 
 def test_overlap_is_within_tau() -> None:
@@ -107,7 +122,7 @@ def ring_edges(poses: list[Array], noise: float) -> list[Edge]:
         for step in (1, 2):
             j = (k + step) % len(poses)
             T = exp(rng.normal(0, noise, 6)) @ inverse(poses[k]) @ poses[j]
-            edges.append(Edge(j, k, T, np.eye(6) * 1000, 1000))
+            edges.append(Edge(j, k, T, np.eye(6) * 1000, 1000, 0.003))
     return edges
 
 
@@ -115,7 +130,7 @@ def test_pose_graph_closes_loops_and_votes_a_wrong_pair_down() -> None:
     truth = ring(8)
     truth = [inverse(truth[0]) @ T for T in truth]
     edges = ring_edges(truth, 0.001)
-    wrong = Edge(5, 1, yaw(2.0, (3.0, 1.0, 0.0)), np.eye(6) * 1000, 1000)
+    wrong = Edge(5, 1, yaw(2.0, (3.0, 1.0, 0.0)), np.eye(6) * 1000, 1000, 0.003)
     found, apart_m = optimise(spanning_start(8, edges), [*edges, wrong])
     assert max(np.linalg.norm(f[:3, 3] - t[:3, 3]) for f, t in zip(found, truth, strict=True)) < 0.02
     assert apart_m[-1] > 1.0
@@ -168,13 +183,28 @@ def test_merged_model_keeps_both_faces_of_a_plate_and_survives_writing(tmp_path:
     face = np.column_stack([rng.uniform(0, 1, (20000, 2)), np.full(20000, 0.012)])
     above = Cloud(face.astype(np.float32), np.tile([0, 0, 1], (20000, 1)).astype(np.float32))
     below = Cloud((face - [0, 0, 0.008]).astype(np.float32), -above.normals)  # an 8 mm plate
-    model = merge([above, below], [np.eye(4), np.eye(4)], 0.02)
-    assert np.allclose(model.points_m[model.station == 0, 2], 0.012)
-    assert np.allclose(model.points_m[model.station == 1, 2], 0.004)
-    assert 2 * 2400 < len(model.points_m) <= 2 * 2601  # one point per 20 mm voxel and face
-    write_model(model, tmp_path / "model.ply")
-    again = read_scan(tmp_path / "model.ply")
-    assert np.array_equal(again.points_m.astype(np.float32), model.points_m)
+    shelf = Shelf(tmp_path)
+    path = tmp_path / "model.ply"
+    shift = pose(np.eye(3), (5.0, -5.1, 0.0))  # over the border of two tiles
+    model = merge([shelf.put(above), shelf.put(below)], [shift, shift], 0.02, tmp_path, path)
+    points_m, station = cloud_sample(path)
+    assert np.allclose(points_m[station == 0, 2], 0.012)
+    assert np.allclose(points_m[station == 1, 2], 0.004)
+    assert 2 * 2400 < model.points <= 2 * 2601  # one point per 20 mm voxel and face
+    assert model.points == len(points_m)
+    assert np.allclose([model.low_m, model.high_m], [points_m.min(axis=0), points_m.max(axis=0)])
+    again = read_scan(path)
     assert again.normals is not None
-    assert np.allclose(again.normals, model.normals)
-    assert b"property uchar station\n" in (tmp_path / "model.ply").read_bytes()[:400]
+    assert np.allclose(again.normals[:, 2], np.where(station == 0, 1.0, -1.0))
+    assert b"property uchar station\n" in path.read_bytes()[:400]
+
+
+def test_shelf_brings_back_what_it_no_longer_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cloud_shelf, "MOST_POINTS", 10_000)
+    shelf = Shelf(tmp_path)
+    clouds = [corner(seed) for seed in range(3)]  # of 9,000 points
+    shelved = [shelf.put(cloud) for cloud in clouds]
+    for one, cloud in zip(shelved, clouds, strict=True):
+        assert np.array_equal(one.cloud().points_m, cloud.points_m)
+        assert np.array_equal(one.cloud().normals, cloud.normals)
+    assert one.cloud() is one.cloud()

@@ -1,6 +1,7 @@
 """Registration of the small site and of real pairs, against their true poses."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ import pytest
 from schemas.problem import BadInput
 from schemas.scan import Scan
 from schemas.settings import RegistrationSettings
-from tasks.registration.register import Registration, register
+from schemas.target import SiteTarget
+from tasks.registration.read_scan import read_scan
+from tasks.registration.register import Registration
+from tasks.registration.register import register as register_to
 from tasks.registration.rigid_motion import Array, angle_deg, inverse, yaw
 from tasks.simulation.bridge import bridge
 from tasks.simulation.scanner import scan
@@ -17,6 +21,11 @@ from tests.registration.site import POSITIONS_M, as_scan, errors_mm_deg, measure
 
 SETTINGS = RegistrationSettings()
 Given = tuple[Scan, Path]
+
+
+def register(given: list[Given], settings: RegistrationSettings, *targets: SiteTarget) -> Registration:
+    with TemporaryDirectory() as folder:
+        return register_to(given, settings, Path(folder) / "model.ply", targets)
 
 
 def measured(folder: Path, k: int) -> Given:
@@ -86,12 +95,14 @@ def test_only_scans_that_share_nothing(site_folder: Path) -> None:
         register([unknown(site_folder, "station0"), unknown(site_folder, "yard")], SETTINGS)
 
 
-def test_one_scan_alone(site_folder: Path) -> None:
+def test_one_scan_alone(site_folder: Path, tmp_path: Path) -> None:
     given = unknown(site_folder, "station1")
-    found = register([given], SETTINGS)
+    found = register_to([given], SETTINGS, tmp_path / "model.ply")
     assert np.array_equal(poses(found)[0], np.eye(4))
-    towards_scanner = np.einsum("ij,ij->i", found.model.normals, -found.model.points_m)
-    assert (towards_scanner > 0).mean() > 0.999
+    assert found.stations[0].covariance is None
+    model = read_scan(found.model.path)
+    assert model.normals is not None
+    assert (np.einsum("ij,ij->i", model.normals, -model.points_m) > 0).mean() > 0.999
 
 
 def test_large_coordinates_keep_their_millimetres(site_folder: Path) -> None:
@@ -102,7 +113,7 @@ def test_large_coordinates_keep_their_millimetres(site_folder: Path) -> None:
         given.append(as_scan(site_folder / f"station{k}.ply", station_position_m=(x + east, y + north, z)))
     found = register(given, SETTINGS)
     assert tuple(found.origin_m) == (east, north, 0.0)
-    assert np.abs(found.model.points_m).max() < 100
+    assert np.abs([found.model.low_m, found.model.high_m]).max() < 100
     for f, t in zip(poses(found), true_poses(found), strict=True):
         assert np.linalg.norm(f[:3, 3] - t[:3, 3]) < 0.005
 

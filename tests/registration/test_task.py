@@ -33,10 +33,11 @@ def test_model_of_two_stations(site_folder: Path) -> None:
     assert np.allclose(cloud.points_m.min(axis=0), model.min_m)
     assert cloud.normals is not None
     assert model == register.bare(tuple(scans), RegistrationSettings())
-    picture, table = pages({}, model)
+    picture, stations, pairs = pages({}, model)
     assert picture.markdown is not None
     assert "2 stations" in picture.markdown
-    assert table.table[0]["source"] == "station0"
+    assert stations.table[1]["station"] == "station3"
+    assert pairs.table[0]["source"] == "station0"
 
 
 def test_a_file_with_several_scans_gives_several(tmp_path: Path) -> None:

@@ -7,7 +7,12 @@ from pathlib import Path
 import numpy as np
 import pye57
 
-from tasks.registration.readers.file_scan import FileScan, Unreadable, rigid_pose
+from tasks.registration.readers.file_scan import BLOCK, FileScan, Unreadable, rigid_pose
+
+FIELDS = {
+    "cartesian": ("cartesianX", "cartesianY", "cartesianZ"),
+    "spherical": ("sphericalRange", "sphericalAzimuth", "sphericalElevation"),
+}
 
 
 def count(path: Path) -> int:
@@ -15,35 +20,37 @@ def count(path: Path) -> int:
         return int(e57.scan_count)
 
 
-def read(path: Path, index: int) -> FileScan:
+def read(path: Path, index: int) -> Iterator[FileScan]:
     """Points that the file marks as invalid are dropped. Spherical coordinates become Cartesian."""
     with _opened(path) as e57:
         if index >= e57.scan_count:
             raise Unreadable(f"it has no scan number {index + 1}")
         header = e57.get_header(index)
         if header.point_count == 0:
-            return FileScan(np.empty((0, 3)))
-        data = e57.read_scan(index, transform=False, ignore_missing_fields=True)
-        if "cartesianX" in data:
-            points = np.column_stack([data[f"cartesian{axis}"] for axis in "XYZ"])
-        else:
-            distance, azimuth, elevation = (
-                data[f"spherical{part}"] for part in ("Range", "Azimuth", "Elevation")
-            )
-            points = distance[:, None] * np.column_stack(
-                [
-                    np.cos(elevation) * np.cos(azimuth),
-                    np.cos(elevation) * np.sin(azimuth),
-                    np.sin(elevation),
-                ]
-            )
+            return
         pose = None
         if header.has_pose():
             matrix = np.eye(4)
             matrix[:3, :3] = header.rotation_matrix
             matrix[:3, 3] = header.translation
             pose = rigid_pose(matrix)
-    return FileScan(points.astype(np.float64), None, pose, np.zeros(3))
+        kind = next((kind for kind in FIELDS if set(FIELDS[kind]) <= set(header.point_fields)), None)
+        if kind is None:
+            raise Unreadable("its points have neither Cartesian nor spherical coordinates")
+        invalid = f"{kind}InvalidState"
+        fields = [*FIELDS[kind], *([invalid] if invalid in header.point_fields else [])]
+        data, buffers = e57.make_buffers(fields, min(BLOCK, header.point_count))
+        reader = header.points.reader(buffers)
+        while read := reader.read():
+            first, second, third = (data[name][:read].astype(np.float64) for name in FIELDS[kind])
+            points = np.column_stack([first, second, third])
+            if kind == "spherical":
+                points = first[:, None] * np.column_stack(
+                    [np.cos(third) * np.cos(second), np.cos(third) * np.sin(second), np.sin(third)]
+                )
+            if invalid in data:
+                points = points[data[invalid][:read] == 0]
+            yield FileScan(points, None, pose, np.zeros(3))
 
 
 @contextmanager

@@ -1,4 +1,8 @@
-"""What every reader hands on: the numbers of one scan as they stand in its file."""
+"""What every reader hands on, block by block: the numbers of one scan as they stand in its file.
+
+A reader's `read(path, index)` yields a scan in blocks of at most BLOCK points, so that no scan is ever whole
+in memory; each block says the pose and viewpoint of its scan again.
+"""
 
 from dataclasses import dataclass
 
@@ -8,13 +12,16 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
+BLOCK = 1 << 20  # points
+
+
 class Unreadable(Exception):
     """A file that is not what its name says, is cut short, or holds what no scan can be."""
 
 
 @dataclass(frozen=True)
 class FileScan:
-    """Lengths in the file's own unit; rows may still be NaN."""
+    """A block of it. Lengths in the file's own unit; rows may still be NaN."""
 
     points: Array  # (N, 3) float64
     normals: Array | None = None  # (N, 3)

@@ -9,7 +9,7 @@ from pathlib import Path
 import laspy
 import numpy as np
 
-from tasks.registration.readers.file_scan import FileScan, Unreadable
+from tasks.registration.readers.file_scan import BLOCK, FileScan, Unreadable
 
 UNIT_OF_GEOKEY_M = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}  # EPSG: metre, foot, US survey foot
 LINEAR_UNITS_KEY = 3076  # GeoTIFF ProjLinearUnitsGeoKey
@@ -20,14 +20,16 @@ def count(path: Path) -> int:
     return 1
 
 
-def read(path: Path, index: int) -> FileScan:
+def read(path: Path, index: int) -> Iterator[FileScan]:
     with _opened(path) as las:
         announced = las.header.point_count
-        points = las.read()
-        found = np.column_stack([points.x, points.y, points.z]).astype(np.float64)
-    if len(found) < announced:
-        raise Unreadable(f"it is cut short: {announced} points are announced and {len(found)} follow")
-    return FileScan(found)
+        found = 0
+        for points in las.chunk_iterator(BLOCK):
+            block = np.column_stack([points.x, points.y, points.z]).astype(np.float64)
+            found += len(block)
+            yield FileScan(block)
+    if found < announced:
+        raise Unreadable(f"it is cut short: {announced} points are announced and {found} follow")
 
 
 def stated_unit_m(path: Path) -> float | None:
@@ -51,7 +53,7 @@ def _opened(path: Path) -> Iterator[laspy.LasReader]:
     try:
         with laspy.open(path) as las:
             yield las
-    except (KeyboardInterrupt, SystemExit, Unreadable):
+    except (KeyboardInterrupt, SystemExit, GeneratorExit, Unreadable):
         raise
     except BaseException as error:  # the LAZ decoder panics with a BaseException of its own
         raise Unreadable(f"laspy refuses it: {str(error).strip() or type(error).__name__}") from error

@@ -1,14 +1,15 @@
 """PCD (Point Cloud Library) 0.7: ascii, binary and binary_compressed."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
-from tasks.registration.readers.file_scan import FileScan, Unreadable
+from tasks.registration.readers.file_scan import BLOCK, FileScan, Unreadable
 from tasks.registration.readers.lzf import decompress
-from tasks.registration.readers.text_rows import read_rows
+from tasks.registration.readers.text_rows import row_blocks
 
 Array = npt.NDArray[np.float64]
 KEYS = {"VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA"}
@@ -19,7 +20,8 @@ def count(path: Path) -> int:
     return 1
 
 
-def read(path: Path, index: int) -> FileScan:
+def read(path: Path, index: int) -> Iterator[FileScan]:
+    """A compressed file is unpacked whole, as its packing wants; the others are read block by block."""
     with path.open("rb") as stream:
         header = _header(stream)
         fields = [name.lower() for name in header["FIELDS"]]
@@ -32,16 +34,25 @@ def read(path: Path, index: int) -> FileScan:
         dtypes = [np.dtype(f"<{kind}") for kind in kinds]
         sizes = [dtype.itemsize * number for dtype, number in zip(dtypes, counts, strict=True)]
         encoding = header["DATA"][0]
+        viewpoint = np.array(header.get("VIEWPOINT", ["0"] * 7), dtype=float)[:3]
+        blocks: Iterator[Array]
         if encoding == "ascii":
             starts = np.cumsum([0, *counts])
             text = (line.decode("ascii") for line in stream)
-            rows = read_rows(text, [int(starts[fields.index(name)]) for name in wanted], points)
+            blocks = row_blocks(text, [int(starts[fields.index(name)]) for name in wanted], points)
         elif encoding == "binary":
-            block = _exactly(stream, points * sum(sizes), path).reshape(points, sum(sizes))
+            _check_length(stream, points * sum(sizes), path)
             starts = np.cumsum([0, *sizes])
-            rows = _columns(
-                [block[:, s : s + d.itemsize] for s, d in zip(starts, dtypes, strict=False)],
-                dtypes, fields, wanted,
+            tables = (
+                np.frombuffer(stream.read(n * sum(sizes)), np.uint8).reshape(n, sum(sizes))
+                for n in _block_sizes(points)
+            )
+            blocks = (
+                _columns(
+                    [table[:, s : s + d.itemsize] for s, d in zip(starts, dtypes, strict=False)],
+                    dtypes, fields, wanted,
+                )
+                for table in tables
             )  # fmt: skip
         elif encoding == "binary_compressed":
             packed, unpacked = (int(n) for n in _exactly(stream, 8, path).view("<u4"))
@@ -49,17 +60,18 @@ def read(path: Path, index: int) -> FileScan:
                 raise Unreadable("its compressed block does not hold the points that its header announces")
             data = decompress(_exactly(stream, packed, path), unpacked)
             starts = np.cumsum([0, *(size * points for size in sizes)])
-            rows = _columns(
-                [
-                    data[s : s + size * points].reshape(points, size)[:, : d.itemsize]
-                    for s, size, d in zip(starts, sizes, dtypes, strict=False)
-                ],
-                dtypes, fields, wanted,
-            )  # fmt: skip
+            raw = [
+                data[s : s + size * points].reshape(points, size)[:, : d.itemsize]
+                for s, size, d in zip(starts, sizes, dtypes, strict=False)
+            ]
+            blocks = (
+                _columns([field[done : done + BLOCK] for field in raw], dtypes, fields, wanted)
+                for done in range(0, points, BLOCK)
+            )
         else:
             raise Unreadable(f"its DATA is {encoding!r}, not ascii, binary or binary_compressed")
-    viewpoint = np.array(header.get("VIEWPOINT", ["0"] * 7), dtype=float)[:3]
-    return FileScan(rows[:, :3], rows[:, 3:] if len(wanted) == 6 else None, None, viewpoint)
+        for rows in blocks:
+            yield FileScan(rows[:, :3], rows[:, 3:] if len(wanted) == 6 else None, None, viewpoint)
 
 
 def _header(stream: BinaryIO) -> dict[str, list[str]]:
@@ -79,11 +91,19 @@ def _header(stream: BinaryIO) -> dict[str, list[str]]:
     return header
 
 
+def _block_sizes(points: int) -> Iterator[int]:
+    return (min(BLOCK, points - done) for done in range(0, points, BLOCK))
+
+
 def _exactly(stream: BinaryIO, size: int, path: Path) -> npt.NDArray[np.uint8]:
+    _check_length(stream, size, path)
+    return np.frombuffer(stream.read(size), np.uint8)
+
+
+def _check_length(stream: BinaryIO, size: int, path: Path) -> None:
     there = path.stat().st_size - stream.tell()
     if not 0 <= size <= there:
         raise Unreadable(f"it is cut short: {size} bytes of points are announced and {there} follow")
-    return np.frombuffer(stream.read(size), np.uint8)
 
 
 def _columns(

@@ -1,14 +1,15 @@
 """PLY: ascii and binary, any scalar types, x y z and, where there, nx ny nz of the element `vertex`."""
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
-from tasks.registration.readers.file_scan import FileScan, Unreadable
-from tasks.registration.readers.text_rows import read_rows
+from tasks.registration.readers.file_scan import BLOCK, Array, FileScan, Unreadable
+from tasks.registration.readers.text_rows import row_blocks
 
 TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -34,7 +35,7 @@ def count(path: Path) -> int:
     return 1
 
 
-def read(path: Path, index: int) -> FileScan:
+def read(path: Path, index: int) -> Iterator[FileScan]:
     with path.open("rb") as stream:
         encoding, elements = _header(stream)
         at = next((i for i, e in enumerate(elements) if e.name == "vertex"), None)
@@ -51,7 +52,8 @@ def read(path: Path, index: int) -> FileScan:
             text = (line.decode("ascii") for line in stream)
             for _ in itertools.islice(text, sum(element.count for element in elements[:at])):
                 pass
-            rows = read_rows(text, [names.index(name) for name in wanted], vertex.count)
+            for rows in row_blocks(text, [names.index(name) for name in wanted], vertex.count):
+                yield _block(rows)
         else:
             order = "<" if encoding == "binary_little_endian" else ">"
             for element in elements[:at]:
@@ -62,9 +64,13 @@ def read(path: Path, index: int) -> FileScan:
                 raise Unreadable(
                     f"it is cut short: {vertex.count} points are announced and {max(there, 0)} follow"
                 )
-            table = np.fromfile(stream, dtype, vertex.count)
-            rows = np.column_stack([table[name].astype(np.float64) for name in wanted])
-    return FileScan(rows[:, :3], rows[:, 3:] if len(wanted) == 6 else None)
+            for done in range(0, vertex.count, BLOCK):
+                table = np.fromfile(stream, dtype, min(BLOCK, vertex.count - done))
+                yield _block(np.column_stack([table[name].astype(np.float64) for name in wanted]))
+
+
+def _block(rows: Array) -> FileScan:
+    return FileScan(rows[:, :3], rows[:, 3:] if rows.shape[1] == 6 else None)
 
 
 def _header(stream: BinaryIO) -> tuple[str, list[Element]]:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tasks.registration.readers.file_scan import FileScan, Unreadable, rigid_pose
-from tasks.registration.readers.text_rows import plain, read_rows
+from tasks.registration.readers.text_rows import plain, read_rows, row_blocks
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def count(path: Path) -> int:
     return scans
 
 
-def read(path: Path, index: int) -> FileScan:
+def read(path: Path, index: int) -> Iterator[FileScan]:
     with path.open(encoding="utf-8") as text:
         lines = _lines(text)
         at = 0
@@ -39,9 +39,10 @@ def read(path: Path, index: int) -> FileScan:
                     pass
                 at += 1
                 continue
-            rows = read_rows(lines, (0, 1, 2), points)
-            returned = rows[(rows != 0).any(axis=1)]
-            return FileScan(returned, None, rigid_pose(transform), np.zeros(3))
+            pose = rigid_pose(transform)
+            for rows in row_blocks(lines, (0, 1, 2), points):
+                yield FileScan(rows[(rows != 0).any(axis=1)], None, pose, np.zeros(3))
+            return
     raise Unreadable(f"it has no scan number {index + 1}")
 
 

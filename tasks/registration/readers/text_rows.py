@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tasks.registration.readers.file_scan import Unreadable
+from tasks.registration.readers.file_scan import BLOCK, Unreadable
 
 Array = npt.NDArray[np.float64]
 
@@ -24,6 +24,21 @@ def is_number(token: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def row_blocks(lines: Iterator[str], columns: Sequence[int], count: int | None = None) -> Iterator[Array]:
+    """Blocks of `read_rows`, at most BLOCK rows each; no empty one."""
+    left = count
+    while left is None or left > 0:
+        asked = BLOCK if left is None else min(left, BLOCK)
+        first = next(lines, None)
+        if first is None and left is None:
+            return
+        here = lines if first is None else itertools.chain([first], itertools.islice(lines, asked - 1))
+        rows = read_rows(here, columns, None if left is None else asked)
+        if left is not None:
+            left -= asked
+        yield rows
 
 
 def read_rows(lines: Iterator[str], columns: Sequence[int], count: int | None = None) -> Array:

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tasks.registration.readers.file_scan import FileScan, Unreadable
-from tasks.registration.readers.text_rows import is_number, plain, read_rows
+from tasks.registration.readers.text_rows import is_number, plain, row_blocks
 
 
 def count(path: Path) -> int:
     return 1
 
 
-def read(path: Path, index: int) -> FileScan:
+def read(path: Path, index: int) -> Iterator[FileScan]:
     """A header row must name x, y, z and may name nx, ny, nz (as `x`, `//X`, `"X [m]"`); without one, the
     first three columns are x, y, z. Separators: blanks, commas, semicolons (then commas are decimal)."""
     with path.open(encoding="utf-8", errors="strict") as lines:
@@ -38,8 +38,8 @@ def read(path: Path, index: int) -> FileScan:
             decimal_comma = ";" in first
         if len(tokens) < 3:
             raise Unreadable("its rows have fewer than the three columns x, y, z")
-        rows = read_rows((plain(line, decimal_comma=decimal_comma) for line in following), columns)
-    return FileScan(rows[:, :3], rows[:, 3:] if rows.shape[1] == 6 else None)
+        for rows in row_blocks((plain(line, decimal_comma=decimal_comma) for line in following), columns):
+            yield FileScan(rows[:, :3], rows[:, 3:] if rows.shape[1] == 6 else None)
 
 
 def _is_comment(line: str) -> bool:
