@@ -26,6 +26,7 @@ class Surface(Contract):
     hull_m: tuple[Vector2, ...]  # convex hull (paper)
     area_m2: float  # of the outline less its holes
     rms_m: float = 0.0  # of the supporting points about the plane
+    deviation_m: float = 0.0  # 95 % of its points lie within this of the plane: how flat it is
     points: int = 0
 
     @property

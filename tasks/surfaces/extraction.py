@@ -12,6 +12,7 @@ from schemas.settings import SurfaceSettings
 from schemas.surface import Surface
 from tasks.surfaces.cloud import Cloud, Floats, Indices
 from tasks.surfaces.clutter import in_clutter
+from tasks.surfaces.curved import cut_curves
 from tasks.surfaces.edges import with_edge_points, without_slivers
 from tasks.surfaces.ground import is_ground, without_scraps
 from tasks.surfaces.isolated import in_large_groups
@@ -114,6 +115,7 @@ def _flat_patches(
     )
     planes = merge_planes(planes, part, settings.distance_m, cell_m)
     planes = without_slivers(planes, part, settings.distance_m)
+    planes = cut_curves(planes, part, settings.distance_m, cell_m)
     voxels = with_edge_points(planes, part, settings.distance_m)
     supports = _points_of([searched[own] for own in voxels], voxel_of)
     found: list[Patch] = []

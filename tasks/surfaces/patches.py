@@ -77,6 +77,7 @@ def _surface(points_m: Floats, rough: Frame, polygon: shapely.Polygon) -> Surfac
         hull_m=_ring(uvw_m[ConvexHull(uvw_m[:, :2]).vertices, :2]),
         area_m2=float(outline.area),
         rms_m=float(np.sqrt(np.mean(uvw_m[:, 2] ** 2))),
+        deviation_m=float(np.quantile(np.abs(uvw_m[:, 2]), 0.95)),
         points=len(points_m),
     )
 
