@@ -1,8 +1,9 @@
-"""Train the network: `python -m training.train PHOTOS SURFACES OUT [--fold N] [--steps N]`.
+"""Train the network: `python -m training.train PHOTOS SURFACES OUT [--fold N] [--steps N] [--start PT]`.
 
 PHOTOS holds images/, masks/ and groups.txt, SURFACES what training.surfaces wrote. With --fold the photos of
 that fold (by group) are left out and judged along the way; without, all take part. Half of each batch is
-photos, half surfaces. One thread and a seed: the same result on the same machine.
+photos, half surfaces. One thread and a seed: the same result on the same machine. --start goes on from
+weights that an earlier call wrote, with a rate that starts anew (Loshchilov & Hutter 2017).
 """
 
 import argparse
@@ -80,6 +81,7 @@ def main() -> None:
     parser.add_argument("--fold", type=int)
     parser.add_argument("--steps", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--start", type=Path)
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
@@ -93,6 +95,8 @@ def main() -> None:
     surfaces = read(args.surfaces, sorted(p.name for p in (args.surfaces / "masks").iterdir()), (0.7, 1.5))
 
     net = Network().to(memory_format=torch.channels_last)
+    if args.start is not None:
+        net.load_state_dict(torch.load(args.start, weights_only=True))
     averaged = copy.deepcopy(net).eval()
     optimiser = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=DECAY)
     began, total = time.monotonic(), 0.0
