@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
 PHOTOS ?= ../shared/data/cracks/uav
-BENCHES := detection
+BENCHES := detection stitching
 
 .PHONY: demo test check bench $(addprefix bench-,$(BENCHES)) train-detector lock clean
 
@@ -22,7 +22,7 @@ check: .venv/.ready
 bench: $(addprefix bench-,$(BENCHES))
 
 $(addprefix bench-,$(BENCHES)): bench-%: .venv/.ready
-	$(BIN)/python -m tests.benchmarks.$*
+	$(BIN)/python -m tests.benchmarks.$* $(ARGS)
 
 train-detector: .venv/.ready  # two hours on two cores; PHOTOS holds images/, masks/ and groups.txt (CC0)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[train]'

@@ -16,6 +16,7 @@ class PhotoPlacement(Contract):
     H_mosaic_photo: Matrix3 | None = None  # undistorted photo pixels to mosaic pixels
     matches: int = 0
     rms_px: float | None = None  # reprojection residual in the mosaic
+    covariance_mm2: tuple[Vector2, Vector2] | None = None  # of where its middle lies among the others
     gain: float = 1.0
 
 

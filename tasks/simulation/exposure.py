@@ -29,7 +29,7 @@ SAMPLES = 13
 FINE_SAMPLES = 55
 BLUR_SIGMA_PX = 0.55  # of the lens in the middle of the image, beside the photosite's own area
 CORNER_BLUR = 0.25  # grows by this share towards the corners
-READOUT_S = 0.015  # from the first row's exposure to the last one's
+READOUT_S = 0.015  # of a small drone's camera
 SKY_RADIANCE = 0.8
 COARSE_PX = 16  # grid of the rays that find out which faces a photo shows
 GRAIN_SECOND = 1.27  # scale of the grain's second, turned layer
@@ -43,6 +43,11 @@ class Motion:
 
     velocity_m_s: Array  # (3,)
     turn_rad_s: Array  # (3,) right-handed about x right, y down, z forward
+    readout_s: float = READOUT_S  # from the first row's exposure to the last one's; 0: a global shutter
+
+    def rows_s(self, camera: Camera) -> Array:
+        """(height,) when each row is exposed, the middle one at 0."""
+        return np.asarray((np.arange(camera.height_px) / camera.height_px - 0.5) * self.readout_s)
 
 
 @lru_cache(maxsize=4)
@@ -155,9 +160,19 @@ def _sample_owners(ys, xs, points, wide, rays, R, position, origin, u, v, normal
 
 
 @numba.njit(cache=True, nogil=True)
+def _onto_relief(uv, o, relief, texel):  # type: ignore[no-untyped-def]
+    """Move the point where a ray from `o` meets the flat face to where it meets the relief, in place; the
+    relief is low and gentle against the ray, so that looking up its height again and again arrives."""
+    u, v = uv[0], uv[1]
+    for _ in range(6):
+        rise = _bilinear(relief, uv[1] / texel, uv[0] / texel) / o[2]
+        uv[0], uv[1] = u + rise * (o[0] - u), v + rise * (o[1] - v)
+
+
+@numba.njit(cache=True, nogil=True)
 def _expose_face(  # type: ignore[no-untyped-def]
     light_sum, share, owner, edge, edge_owner, me, size, rays, offset, turned, wide, turn, drift, coarse,
-    fine, tone, texel, light, light_texel, grain, grain_texel, cos_turn, sin_turn,
+    fine, tone, texel, relief, relief_texel, light, light_texel, grain, grain_texel, cos_turn, sin_turn,
     columns, rows, start, items, kind, paint, p, rgb,
 ):  # fmt: skip
     """Add what face `me` sends to each photosite to `light_sum`, and the share of its samples to `share`.
@@ -186,6 +201,8 @@ def _expose_face(  # type: ignore[no-untyped-def]
                 reach = -o[2] / down if ahead else 0.0
                 uv[k, 0] = o[0] + reach * (T[0, 0] * a + T[0, 1] * b + T[0, 2])
                 uv[k, 1] = o[1] + reach * (T[1, 0] * a + T[1, 1] * b + T[1, 2])
+                if relief.shape[0] > 0 and ahead:
+                    _onto_relief(uv[k], o, relief, relief_texel)
             if not ahead:
                 continue
             u0, v0 = uv[0, 0], uv[0, 1]
@@ -239,7 +256,7 @@ def expose(
 
     look(index) gives the skin of a face and the light on it."""
     rays = _rays(camera)
-    rows_s = (np.arange(camera.height_px) / camera.height_px - 0.5) * READOUT_S
+    rows_s = motion.rows_s(camera)
     position = np.asarray(pose.position_m) + rows_s[:, None] * motion.velocity_m_s
     R = pose.R_world_camera @ (np.eye(3) + rows_s[:, None, None] * _cross(motion.turn_rad_s))
     seen = visible_faces(camera, pose, faces)
@@ -266,7 +283,7 @@ def expose(
             light_sum, share, owner, edge, edge_owner, me, near.size[me], rays,
             (position - near.origin[me]) @ axes.T, axes @ R, wide,
             turn, axes @ motion.velocity_m_s * camera.shutter_s, coarse, fine,
-            skin.tone, skin.texel_m, light.irradiance, light.texel_m, skin.grain, skin.grain_texel_m,
+            skin.tone, skin.texel_m, skin.relief_m, skin.relief_texel_m, light.irradiance, light.texel_m, skin.grain, skin.grain_texel_m,
             np.cos(angle), np.sin(angle), marks.columns, marks.rows, marks.start, marks.items,
             marks.kind, marks.paint, marks.p, marks.rgb,
         )  # fmt: skip

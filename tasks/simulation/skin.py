@@ -1,6 +1,6 @@
 """What a face looks like before light falls on it: reflectance, fine grain, marks. In linear light."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -17,7 +17,8 @@ Rgb = tuple[float, float, float]
 class Skin:
     """tone (rows, columns, 3) float32: reflectance 0..1 of waves longer than its texel, row 0 at v = 0;
     texel (r, c) is centred at v = r·texel_m, u = c·texel_m. grain: int8 tile of relative brightness × 127,
-    sampled twice, the second time turned by `turn_deg`, so that nothing visible repeats."""
+    sampled twice, the second time turned by `turn_deg`, so that nothing visible repeats. relief_m: (rows,
+    columns) height of the surface over the face's plane, 0 rows where it is flat."""
 
     tone: Floats
     texel_m: float
@@ -25,6 +26,8 @@ class Skin:
     grain_texel_m: float
     turn_deg: float
     marks: Marks
+    relief_m: Floats = field(default_factory=lambda: np.zeros((0, 0), np.float32))
+    relief_texel_m: float = 1.0
 
 
 def fine_grain(seed: int, octave_rms: float, stretch: float = 1.0) -> tuple[npt.NDArray[np.int8], float]:

@@ -1,0 +1,200 @@
+"""`make bench-stitching`: errors of mosaics against truth, in photo pixels, beside OpenCV's stitcher, the
+`stitching` package and pyOrthomosaic. Small sets by default; ARGS=--full is 30 photos of 8 MP and 5 seeds.
+
+A peer that is not installed is a row that says so."""
+
+import argparse
+import json
+import resource
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from artifacts import store
+from flows.console import out
+from schemas.mosaic import Mosaic, PhotoPlacement
+from schemas.photo import Photo
+from schemas.problem import BadInput
+from schemas.settings import StitchSettings
+from tasks.photos.task import features, ingest
+from tasks.stitching.task import stitch
+from tests.benchmarks.wall_photos import CASES, GSD_M, Case, WallPhotos, wall_photos
+
+Array = npt.NDArray[np.float64]
+
+BARS = {"plane": (0.15, 1.0), "k1": (0.3, None), "rolling": (0.5, None)}  # px RMS, px worst
+IN_99 = 9.2103  # d² of two numbers that holds 99 %
+
+
+@dataclass(frozen=True)
+class Run:
+    photos: WallPhotos
+    mosaic: Mosaic
+    refused: dict[str, str]  # before stitching, by name
+    cpu_s: float
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of the solved photos, after the best similarity, in photo pixels (GSD_M)."""
+
+    rms_px: float
+    worst_px: float
+    d2: Array  # (photos,) of each photo's middle against its stated covariance
+    gain: float  # worst relative error of a gain
+
+
+def run(photos: WallPhotos) -> Run:
+    began = time.process_time()
+    taken: list[Photo] = []
+    refused: dict[str, str] = {}
+    for path in sorted(photos.folder.glob("*.jpg")):
+        try:
+            taken.append(
+                ingest.bare(
+                    store.current().put(path),
+                    path.name,
+                    "wall",
+                    photos.camera,
+                    photos.poses[path.name],
+                    photos.position_sigma_m,
+                )
+            )
+        except BadInput as problem:
+            refused[path.name] = problem.what
+    settings = StitchSettings()
+    described = tuple(features.bare(photo, settings) for photo in taken)
+    mosaic = stitch.bare("wall", photos.face.surface(), tuple(taken), described, settings)
+    return Run(photos, mosaic, refused, time.process_time() - began)
+
+
+def errors(mosaic: Mosaic, photos: WallPhotos) -> Errors:
+    solved = [
+        (photo, placement)
+        for photo, placement in zip(mosaic.photos, mosaic.placements, strict=True)
+        if placement.status == "solved" and photo.name in photos.truth
+    ]
+    found = [_on_plane(mosaic, photo, placement, photos.truth[photo.name].px) for photo, placement in solved]
+    real = [photos.truth[photo.name].uv_m for photo, _ in solved]
+    off = _after_similarity(found, real) / GSD_M
+    middle = [one.mean(axis=0)[None] for one in found]
+    drift = _after_similarity(middle, [one.mean(axis=0)[None] for one in real])
+    d2 = [
+        float(e @ np.linalg.solve(np.array(placement.covariance_mm2), e))
+        for (_, placement), e in zip(solved, drift * 1000.0, strict=True)
+        if placement.covariance_mm2 is not None
+    ]
+    gains = np.array([placement.gain for _, placement in solved])
+    gains *= np.array([photos.truth[photo.name].exposed for photo, _ in solved])
+    gains /= np.exp(np.log(gains).mean())
+    lengths = np.linalg.norm(off, axis=1)
+    return Errors(
+        float(np.sqrt(np.mean(lengths**2))),
+        float(lengths.max()),
+        np.array(d2),
+        float(np.abs(gains - 1).max()),
+    )
+
+
+def _on_plane(mosaic: Mosaic, photo: Photo, placement: PhotoPlacement, px: Array) -> Array:
+    """(N, 2) metres where the mosaic shows (N, 2) pixels of the photo as taken."""
+    assert placement.H_mosaic_photo is not None
+    camera = photo.camera
+    ideal = camera.undistort((px - camera.principal_px) / camera.focal_px)
+    flat = ideal * camera.focal_px + camera.principal_px
+    q = np.column_stack([flat, np.ones(len(flat))]) @ np.array(placement.H_mosaic_photo).T
+    xy = q[:, :2] / q[:, 2:]
+    return np.asarray(xy * (mosaic.gsd_mm_px or 0.0) / 1000.0 * [1, -1] + mosaic.origin_uv_m)
+
+
+def _after_similarity(found: Sequence[Array], real: Sequence[Array]) -> Array:
+    """(N, 2) what is left of found − real after the best turn, scale and shift."""
+    z, w = np.concatenate(found) @ [1, 1j], np.concatenate(real) @ [1, 1j]
+    columns = np.column_stack([z, np.ones(len(z))])
+    left = columns @ np.linalg.lstsq(columns, w, rcond=None)[0] - w
+    return np.column_stack([left.real, left.imag])
+
+
+def row(
+    what: str, value: float, unit: str, least: float | None = None, most: float | None = None, **known: Any
+) -> dict[str, Any]:
+    """A line of the table; it holds where the value lies from `least` to `most`."""
+    low, high = -np.inf if least is None else least, np.inf if most is None else most
+    barred = least is not None or most is not None
+    return {
+        "what": what,
+        "value": round(float(value), 3),
+        "unit": unit,
+        "bar": " and ".join(f"{s} {b:g}" for s, b in (("≥", least), ("≤", most)) if b is not None) or None,
+        "holds": bool(low <= value <= high) if barred else None,
+        "peer": None,
+        "peer_value": None,
+        "data": None,
+        "seed": None,
+    } | known
+
+
+def rows_of(case: Case, runs: Sequence[Run], data: str) -> list[dict[str, Any]]:
+    """The worst of all seeds."""
+    scores = [errors(run.mosaic, run.photos) for run in runs]
+    known = {"data": data, "seed": f"1..{len(runs)}"}
+    rms_bar, worst_bar = BARS.get(case.name, (None, None))
+    d2 = np.concatenate([s.d2 for s in scores])
+    own = [p.status for run in runs for p in run.mosaic.placements if p.name in run.photos.truth]
+    strangers = sum(
+        p.status != "rejected" and p.name not in run.photos.truth
+        for run in runs
+        for p in run.mosaic.placements
+    )
+    return [
+        row(f"{case.what}: error", max(s.rms_px for s in scores), "px RMS", most=rms_bar, **known),
+        row(f"{case.what}: worst error", max(s.worst_px for s in scores), "px", most=worst_bar, **known),
+        row(f"{case.what}: mean d²/2", d2.mean() / 2, "1", least=0.8, most=1.2, **known),
+        row(f"{case.what}: inside 99 %", 100 * (d2 < IN_99).mean(), "%", least=97, **known),
+        row(f"{case.what}: gain error", 100 * max(s.gain for s in scores), "%", most=0.5, **known),
+        row(f"{case.what}: lost of {len(own)} photos", own.count("rejected"), "photos", most=0, **known),
+        row(f"{case.what}: strangers taken in", strangers, "photos", most=0, **known),
+        row(f"{case.what}: CPU time", float(np.mean([run.cpu_s for run in runs])), "s", **known),
+    ]
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--full", action="store_true", help="30 photos of 8 MP, 5 seeds")
+    asked.add_argument("--seeds", type=int, default=1)
+    asked.add_argument("--cases", nargs="*", default=[case.name for case in CASES])
+    asked.add_argument("--cache", type=Path, default=Path("build/bench/photos"))
+    asked.add_argument("--grid", type=int, nargs=2, default=(4, 3))
+    asked.add_argument("--megapixels", type=float, default=2.0)
+    given = asked.parse_args()
+    columns, rows = (6, 5) if given.full else given.grid
+    megapixels, seeds = (8.0, 5) if given.full else (given.megapixels, given.seeds)
+    size = f"simulated, {columns * rows} × {megapixels:g} MP"
+    table: list[dict[str, Any]] = []
+    for case in CASES:
+        if case.name not in given.cases:
+            continue
+        runs = []
+        for seed in range(1, seeds + 1):
+            photos = wall_photos(case, columns, rows, megapixels, seed, given.cache)
+            with store.temporary():
+                runs.append(run(photos))
+        for line in rows_of(case, runs, size):
+            table.append(line)
+            mark = {True: "holds", False: "MISSED", None: ""}[line["holds"]]
+            out.print(f"{line['what']:68} {line['value']:9} {line['unit']:7} {line['bar'] or '':15} {mark}")
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    table.append(row("peak memory", peak, "GiB", most=4.0, data=size))
+    path = Path("build/bench/stitching.json")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n")
+    out.print(f"\n{path}")
+
+
+if __name__ == "__main__":
+    main()
