@@ -35,13 +35,13 @@ Array = npt.NDArray[np.float64]
 Rng = np.random.Generator
 
 
-def surface(seed: int) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
+def surface(seed: int, crack_free: bool = False) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
     """(SIDE_PX, SIDE_PX, 3) uint8 RGB photo of a surface and its (SIDE_PX, SIDE_PX) truth, 255 on cracks."""
     rng = np.random.default_rng([seed, 0x547261696E])
     px_m = float(np.exp(rng.uniform(np.log(0.0003), np.log(0.0015))))
     side_m = 1.04 * SIDE_PX * px_m
     face = Face("board", (-side_m / 2, 0.0, -side_m / 2), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), side_m, side_m)
-    cracks = () if rng.random() < CRACK_FREE else _cracks(rng, side_m, px_m)
+    cracks = () if rng.random() < (1.0 if crack_free else CRACK_FREE) else _cracks(rng, side_m, px_m)
     skin = _skin(rng, seed, face, px_m, cracks)
     camera = Camera(width_px=SIDE_PX, height_px=SIDE_PX, focal_px=FOCAL_PX)
     pose = CameraPose(position_m=(0.0, -FOCAL_PX * px_m, 0.0), yaw_deg=0.0, pitch_deg=0.0)
