@@ -8,6 +8,7 @@ import numpy as np
 from tasks.registration.rigid_motion import Array, adjoint, exp, inverse, log, orthonormal, pose
 
 ITERATIONS = 50
+SHARED = 16  # points of the fine alignment in a coarse voxel of a surface: much the same errors
 LEAST_SCALE_M = 0.003  # pairs that contradict the rest by less are all kept
 
 
@@ -53,18 +54,16 @@ def covariances(
     """(6, 6) of each station: turn (radians) and shift (metres) of its scanner (at (3,) `scanner_m`,
     about the frame's axes), relative to all stations together (a free network: none is fixed).
 
-    The variance of a pair's distances is the larger of what the loops close to (of unit weight a posteriori)
-    and what the pairs leave. Points of one surface share their errors, so that the loops say more. Only one
-    station: zeros.
+    The variance of a pair's distances is what the loops close to (unit weight a posteriori). Where there are
+    none, it is what the pairs leave, as often as points share their errors. Only one station: zeros.
     """
     n = len(T_frame_station)
     if n == 1:
         return [np.zeros((6, 6))]
     A, _, square = _normal_equations(T_frame_station, edges, 1.0)
     redundant = 6 * (len(edges) - n + 1)
-    variance_m2 = float(np.mean([edge.rmse_m**2 for edge in edges]))
-    if redundant:
-        variance_m2 = max(variance_m2, square / redundant)
+    left_m2 = float(np.mean([edge.rmse_m**2 for edge in edges]))
+    variance_m2 = square / redundant if redundant else SHARED * left_m2
     free = slice(6, None)
     C = np.zeros_like(A)
     C[free, free] = variance_m2 * np.linalg.inv(

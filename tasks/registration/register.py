@@ -30,7 +30,7 @@ from tasks.registration.read_scan import LARGE_COORDINATE_M
 from tasks.registration.rigid_motion import Array, pose, transform
 from tasks.registration.site_datum import Sighting, residuals, tie_to_datum, unused
 from tasks.registration.station_site import Site, shape
-from tasks.registration.ties import Tie, candidate_pairs, tie
+from tasks.registration.ties import Tie, aligned, candidate_pairs, ties
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def register(
         folder = Path(name)
         shelf = Shelf(folder)
         sites, left_out = load_stations(scans, settings, shelf, lambda f: on_progress(0.4 * f))
-        tied, T_first, ties = _tie_together(sites, settings, lambda f: on_progress(0.4 + 0.5 * f))
+        tied, T_first, kept = _tie_together(sites, settings, lambda f: on_progress(0.4 + 0.5 * f))
         loose = [site for i, site in enumerate(sites) if i not in tied]
         _refuse(sites, loose, settings.require_all)
         sites = [sites[i] for i in tied]
@@ -72,8 +72,8 @@ def register(
     return Registration(
         model=model,
         origin_m=origin_m,
-        stations=_stations(sites, T_first, T_world, T_world_first, [t.edge for t in ties]),
-        pairs=tuple(_scan_pair(one, sites) for one in ties),
+        stations=_stations(sites, T_first, T_world, T_world_first, [t.edge for t in kept]),
+        pairs=tuple(_scan_pair(one, sites) for one in kept),
         targets=found,
         left_out=(*left_out, *map(_disconnected, loose), *unused_targets),
     )
@@ -87,22 +87,23 @@ def _tie_together(
     voxel_m = max(float(np.median([s.coarse_voxel_m for s in sites])), settings.tau_m)
     shapes = [shape(s, voxel_m) for s in sites]
     T_placed = place(sites, shapes, voxel_m, settings.min_overlap, lambda f: on_progress(0.4 * f))
-    ties = []
+    edges = []
     pairs = list(candidate_pairs(T_placed, shapes, voxel_m, settings.min_overlap))
     for k, (source, target, T_start) in enumerate(pairs):
-        found = tie(sites, shapes, source, target, T_start, settings)
-        if found is not None:
-            ties.append(found)
-        on_progress(0.4 + 0.6 * (k + 1) / len(pairs))
-    tied = sorted(component(min(T_placed), [t.edge for t in ties]))
+        edge = aligned(shapes, source, target, T_start, settings)
+        if edge is not None:
+            edges.append(edge)
+        on_progress(0.4 + 0.5 * (k + 1) / len(pairs))
+    all_ties = ties(sites, edges, settings)
+    tied = sorted(component(min(T_placed), [t.edge for t in all_ties]))
     at = {station: k for k, station in enumerate(tied)}
-    ties = [
+    kept = [
         replace(t, edge=replace(t.edge, source=at[t.edge.source], target=at[t.edge.target]))
-        for t in ties
+        for t in all_ties
         if t.edge.source in at
     ]
-    T_first, ties = _adjust(len(tied), ties, settings.tau_m / 2)
-    return tied, T_first, ties
+    T_first, kept = _adjust(len(tied), kept, settings.tau_m / 2)
+    return tied, T_first, kept
 
 
 def _adjust(stations: int, ties: list[Tie], wrong_m: float) -> tuple[list[Array], list[Tie]]:

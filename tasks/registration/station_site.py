@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from schemas.problem import BadInput
 from schemas.scan import Scan
@@ -17,6 +18,7 @@ from tasks.registration.station_cloud import Cloud, coarse_cloud, coarse_voxel_m
 
 LEAST_POINTS = 100  # fewer, at equal density, are no scan of a structure
 FEATURE_RADII = 5  # coarse voxels
+OVERLAP_POINTS = 20_000  # tell a share of them to half a percent
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class Site:
 
     name: str
     fine: Shelved  # local frame
+    sample_m: npt.NDArray[np.float32]  # (N, 3) local, evenly chosen from the fine cloud
     coarse_voxel_m: float  # at which its shape has about the right number of points
     scanner_m: Array | None  # (3,) local
     shift_m: Array  # (3,) local + shift = scan
@@ -75,6 +78,7 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
     return Site(
         name=scan.name,
         fine=shelf.put(fine),
+        sample_m=fine.points_m[:: max(1, len(fine) // OVERLAP_POINTS)].copy(),
         coarse_voxel_m=coarse_voxel_m(fine),
         scanner_m=scanner_m,
         shift_m=loaded.origin_m,

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
 from schemas.settings import RegistrationSettings
 from tasks.registration.icp import align
@@ -13,10 +12,9 @@ from tasks.registration.overlap import overlap, overlapping
 from tasks.registration.placement import LEAST_STABILITY
 from tasks.registration.pose_graph import Edge
 from tasks.registration.rigid_motion import Array, inverse, transform
-from tasks.registration.station_cloud import Cloud, balanced_sample
+from tasks.registration.station_cloud import balanced_sample
 from tasks.registration.station_site import Shape, Site
 
-OVERLAP_POINTS = 20_000
 FINE_POINTS = 30_000  # of a source in fine alignment: 3 mm noise averages out to hundredths
 
 
@@ -41,15 +39,10 @@ def candidate_pairs(
             yield source, target, T
 
 
-def tie(
-    sites: Sequence[Site],
-    shapes: Sequence[Shape],
-    source: int,
-    target: int,
-    T_start: Array,
-    settings: RegistrationSettings,
-) -> Tie | None:
-    """The tie of two stations, or None where they do not overlap by the paper's τ as much as is asked."""
+def aligned(
+    shapes: Sequence[Shape], source: int, target: int, T_start: Array, settings: RegistrationSettings
+) -> Edge | None:
+    """The fine alignment of two stations, or None where it does not hold near the coarse one."""
     voxel_m = shapes[source].voxel_m
     sample = balanced_sample(shapes[source].middle, FINE_POINTS, settings.seed)
     found = align(sample, shapes[target].middle, T_start, (voxel_m, voxel_m / 2))
@@ -59,14 +52,25 @@ def tie(
     moved_m = transform(T, sample.points_m) - transform(T_start, sample.points_m)
     if np.linalg.norm(moved_m, axis=1).mean() > 4 * voxel_m:
         return None
-    one, other = sites[source].fine.cloud(), sites[target].fine.cloud()
-    near = overlapping(_some(one), other, T, settings.tau_m).mean()
-    back = overlapping(_some(other), one, inverse(T), settings.tau_m).mean()
-    if max(near, back) < settings.min_overlap:
-        return None
-    return Tie(Edge(source, target, T, found.information, found.inliers, found.rmse_m), float(near))
+    return Edge(source, target, T, found.information, found.inliers, found.rmse_m)
 
 
-def _some(cloud: Cloud) -> npt.NDArray[np.float32]:
-    """Evenly chosen points, enough to tell a share of them to half a percent."""
-    return cloud.points_m[:: max(1, len(cloud) // OVERLAP_POINTS)]
+def ties(sites: Sequence[Site], edges: Sequence[Edge], settings: RegistrationSettings) -> list[Tie]:
+    """The edges whose stations overlap by the paper's τ as much as is asked; each fine cloud is taken once."""
+    near: dict[tuple[int, int], float] = {}  # share of the first station's points near one of the second
+    for station, site in enumerate(sites):
+        touching = [e for e in edges if station in (e.source, e.target)]
+        cloud = site.fine.cloud() if touching else None
+        for edge in touching:
+            assert cloud is not None
+            other, T = edge.source, edge.T_target_source
+            if station == edge.source:
+                other, T = edge.target, inverse(T)
+            share = overlapping(sites[other].sample_m, cloud, T, settings.tau_m).mean()
+            near[other, station] = float(share)
+    found = []
+    for edge in edges:
+        share, back = near[edge.source, edge.target], near[edge.target, edge.source]
+        if max(share, back) >= settings.min_overlap:
+            found.append(Tie(edge, share))
+    return found
