@@ -62,7 +62,9 @@ def _document(plan: FlightPlan, executable: bool) -> Element:
         )
     _put(folder, autoFlightSpeed=plan.vehicle.speed_m_s)
     if not executable:
-        _put(folder, gimbalPitchMode="usePointSetting", globalWaypointTurnMode=STOPPED, globalUseStraightLine=1)
+        _put(
+            folder, gimbalPitchMode="usePointSetting", globalWaypointTurnMode=STOPPED, globalUseStraightLine=1
+        )
     for index, waypoint in enumerate(plan.waypoints):
         _placemark(folder, plan, index, waypoint, executable)
     return root

@@ -54,9 +54,12 @@ def write_structure(folder: Path, structure: Structure, copy: bool = False) -> N
     lay_out(folder, {"occupied.ply": structure.occupied}, copy=copy)
 
 
-def write_flight_plan(folder: Path, plan: FlightPlan) -> None:
-    """plan.json and the mission files, one of each kind a flight: mission.*, mission-2.*, …"""
+def write_flight_plan(folder: Path, plan: FlightPlan, copy: bool = False) -> None:
+    """plan.json; SURFACE.width_mm.tif, the smallest measurable width at each place; and the mission files, one of
+    each kind a flight: mission.*, mission-2.*, …"""
     write_json(folder / "plan.json", plan)
+    maps = {f"{c.surface}.width_mm.tif": c.width_map for c in plan.coverage if c.width_map is not None}
+    lay_out(folder, maps, copy=copy)
     names = [f"mission-{n}" if n > 1 else "mission" for n in range(1, len(plan.each_flight) + 1)]
     for name, flight in zip(names, plan.each_flight, strict=True):
         write_missions(flight, folder / name)

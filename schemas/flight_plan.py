@@ -5,6 +5,7 @@ from typing import Literal
 from schemas.box import Box
 from schemas.camera import Camera, CameraPose
 from schemas.contract import Contract, Vector2, Vector3
+from schemas.file import File
 from schemas.geodesy import GeoOrigin
 from schemas.problem import LeftOut
 from schemas.vehicle import Vehicle
@@ -35,6 +36,12 @@ class SurfaceCoverage(Contract):
     gsd_mm_px: float
     photos: int
     not_reached: tuple[str, ...] = ()  # reasons, in words, for what is not covered
+    reachable: float = 1.0  # share of the area that any allowed place shows at the asked GSD and angle
+    twice: float | None = None  # share of the reachable area in at least two photos, flown exactly as planned
+    twice_median: float | None = None  # and over many flights whose positions err as the vehicle's do:
+    twice_p05: float | None = None  # 95 of 100 flights show more than this
+    measurable_mm: float | None = None  # crack width that can be measured on 95 % of the reachable area
+    width_map: File | None = None  # TIFF, float32 mm: smallest measurable width, NaN where nothing is seen
 
 
 class Flight(Contract):

@@ -22,7 +22,9 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 MOST_CELLS = 12_000_000  # bounds memory: about 25 bytes a cell while distances are found
-SPECK = np.ones((2, 2, 2), dtype=bool)  # unknown spots thinner than two voxels are the raster's, not the world's
+SPECK = np.ones(
+    (2, 2, 2), dtype=bool
+)  # unknown spots thinner than two voxels are the raster's, not the world's
 
 DIRECTIONS = np.array(list(product((-1, 0, 1), repeat=3)))
 
@@ -77,7 +79,12 @@ class Allowed:
 
 
 def allowed_region(
-    structure: Structure, points_m: Array, settings: PlanSettings, margin_m: float, low_m: Array, high_m: Array
+    structure: Structure,
+    points_m: Array,
+    settings: PlanSettings,
+    margin_m: float,
+    low_m: Array,
+    high_m: Array,
 ) -> Allowed:
     """The region from low_m to high_m. Raises BadInput where nothing in it is known to be free."""
     if not structure.stations_m and not settings.free_m:

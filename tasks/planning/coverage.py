@@ -1,22 +1,38 @@
-"""What the planned photos will see of a surface, by casting rays from the planned poses."""
+"""What the planned photos will see of a surface: rays from the planned poses, and from where the vehicle may be
+instead when its position errs."""
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import shapely
+from numba import njit
 
 from schemas.camera import Camera, CameraPose
 from schemas.surface import Surface
+from schemas.vehicle import Vehicle
 from tasks.planning.sight import Scene, outline_of
+from tasks.planning.view_table import AROUND, FROM_SIGMA, view_table
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 MOST_SAMPLES = 200_000  # of one surface
-GSD_TOLERANCE = 1.1  # a pixel this much larger than asked still counts
+SAMPLES_ACROSS = 12  # a photo's shorter side
+GSD_TOLERANCE = 1.02  # a pixel this much larger than asked still counts: rounding of angles and places
+BIAS_S = 120.0  # memory of the slow part of the position error, which walks over minutes
+DRAWS = 200
+TENTHS_OF_PERCENT = 1000.0
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A surface as equal squares."""
+
+    uv_m: Array  # (N, 2) their middles
+    points_m: Array  # (N, 3) in the world
+    cell_m: float
 
 
 @dataclass(frozen=True)
@@ -29,10 +45,27 @@ class Seen:
     hidden: Flags  # (N,) in a photo's frame but behind something
     oblique: Flags  # (N,) seen, but at more than the largest incidence
     coarse: Flags  # (N,) seen, but with larger pixels
+    best_mm_px: Array  # (N,) smallest pixel that sees it within the angle, inf where none does
 
     @property
     def covered(self) -> float:
         return float((self.photos > 0).mean()) if len(self.photos) else 0.0
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What is seen when positions err: of each draw the share of the samples, and of each sample its pixel."""
+
+    once: Array  # (D,) share of the samples in at least one photo at the asked GSD and angle
+    twice: Array  # (D,) in at least two
+    lacking: Array  # (N,) of the worst tenth of the draws, the share in which a sample is not in two
+    mm_px: Array  # (N,) pixel size that 95 % of the draws reach, inf where fewer see the sample at all
+
+
+def samples_of(surface: Surface, camera: Camera, gsd_mm_px: float) -> Samples:
+    shorter_m = min(camera.width_px, camera.height_px) * gsd_mm_px / 1000
+    uv, cell = _samples(surface, shorter_m / SAMPLES_ACROSS)
+    return Samples(uv, surface.to_world(uv), cell)
 
 
 def seen_by(
@@ -42,44 +75,113 @@ def seen_by(
     gsd_mm_px: float,
     max_incidence_deg: float,
     scene: Scene,
+    samples: Samples | None = None,
 ) -> Seen:
     """Sample the surface's area evenly and count for each sample the photos that see it."""
-    uv, cell = _samples(surface, min(camera.footprint_m(camera.stand_off_m(gsd_mm_px))) / 12)
-    points = surface.to_world(uv)
-    photos = np.zeros(len(uv), dtype=np.int64)
-    hidden, oblique, coarse = (np.zeros(len(uv), dtype=bool) for _ in range(3))
-    for pose in poses:
-        index = _in_frame(camera, pose, points)
-        if not index.size:
-            continue
-        visible = scene.sees(np.asarray(pose.position_m), points[index])
-        cos_incidence, gsd = _view_of(surface, camera, pose, points[index])
-        steep = cos_incidence >= np.cos(np.radians(max_incidence_deg)) - 1e-9
-        fine = gsd <= gsd_mm_px * GSD_TOLERANCE
-        photos[index[visible & steep & fine]] += 1
-        hidden[index[~visible]] = True
-        oblique[index[visible & ~steep]] = True
-        coarse[index[visible & steep & ~fine]] = True
-    return Seen(uv, cell, photos, hidden, oblique, coarse)
+    samples = samples or samples_of(surface, camera, gsd_mm_px)
+    table = view_table(surface, camera, poses, samples.points_m, scene, 0.0)
+    count = len(samples.uv_m)
+    photos = np.zeros(count, dtype=np.int64)
+    hidden, oblique, coarse = (np.zeros(count, dtype=bool) for _ in range(3))
+    best = np.full(count, np.inf)
+    _count(
+        table.eyes_m, table.R_world_camera, table.first, table.samples, table.visible[0],
+        samples.points_m, np.asarray(surface.plane.normal), *_optics(camera),
+        gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9,
+        photos, np.zeros(len(table.samples), dtype=np.bool_), hidden, oblique, coarse, best,
+    )  # fmt: skip
+    return Seen(samples.uv_m, samples.cell_m, photos, hidden, oblique, coarse, best)
 
 
-def reasons(seen: Seen, refused: Counter[str]) -> tuple[str, ...]:
-    """Why parts of the surface are not seen, in words with their areas; empty where all of it is."""
-    missed = seen.photos == 0
-    behind = missed & seen.hidden
-    angled = missed & ~behind & seen.oblique
-    small = missed & ~behind & ~angled & seen.coarse
-    never = missed & ~behind & ~angled & ~small
-    words = [
-        (behind, "hidden behind something"),
-        (angled, "seen only at too large an angle"),
-        (small, "seen only with pixels larger than asked"),
-        (never, "in no photo"),
-    ]
-    areas = [(float(flags.sum()) * seen.cell_m**2, text) for flags, text in words]
-    told = [f"{area:.2f} m² {text}" for area, text in areas if area > 0]
-    if told:
-        told += [f"{count} shooting points left out: {reason}" for reason, count in sorted(refused.items())]
+def seen_well(
+    surface: Surface,
+    camera: Camera,
+    poses: Sequence[CameraPose],
+    gsd_mm_px: float,
+    max_incidence_deg: float,
+    scene: Scene,
+    samples: Samples | None = None,
+) -> tuple[list[npt.NDArray[np.int64]], Samples]:
+    """Of each photo the numbers of the samples that it shows at the asked size of pixels and angle."""
+    samples = samples or samples_of(surface, camera, gsd_mm_px)
+    table = view_table(surface, camera, poses, samples.points_m, scene, 0.0)
+    count = len(samples.uv_m)
+    well = np.zeros(len(table.samples), dtype=np.bool_)
+    _count(
+        table.eyes_m, table.R_world_camera, table.first, table.samples, table.visible[0],
+        samples.points_m, np.asarray(surface.plane.normal), *_optics(camera),
+        gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9,
+        np.zeros(count, dtype=np.int64), well, *(np.zeros(count, dtype=np.bool_) for _ in range(3)),
+        np.full(count, np.inf),
+    )  # fmt: skip
+    spans = zip(table.first, table.first[1:], strict=False)
+    return [table.samples[a:b][well[a:b]] for a, b in spans], samples
+
+
+def drawn(
+    surface: Surface,
+    camera: Camera,
+    poses: Sequence[CameraPose],
+    times_s: Array,
+    vehicle: Vehicle,
+    gsd_mm_px: float,
+    max_incidence_deg: float,
+    scene: Scene,
+    reachable: Flags,
+    samples: Samples | None = None,
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> Drawn:
+    """Fly the photos `draws` times, each with another walk of the position error.
+
+    times_s: (P,) when each photo is taken; a battery change is time enough to forget the bias.
+    reachable: (N,) of the surface's samples, those that the shares count."""
+    samples = samples or samples_of(surface, camera, gsd_mm_px)
+    sigma = float(np.hypot(vehicle.position_bias_m, vehicle.position_jitter_m))
+    table = view_table(surface, camera, poses, samples.points_m, scene, sigma)
+    rng = np.random.default_rng([seed, 0x64726177])
+    once, twice = np.zeros(draws), np.zeros(draws)
+    lacks = np.zeros((draws, len(samples.uv_m)), dtype=bool)
+    optics = _optics(camera)
+    tenths = np.full((draws, len(samples.uv_m)), np.iinfo(np.uint16).max, dtype=np.uint16)
+    for draw in range(draws):
+        offsets = position_errors(times_s, vehicle, rng)
+        nearest = ((offsets[:, None] - AROUND * FROM_SIGMA * sigma) ** 2).sum(axis=2).argmin(axis=1)
+        photos, best = _photos_of(
+            table.eyes_m + offsets, nearest, table.R_world_camera, table.first, table.samples, table.visible,
+            samples.points_m, np.asarray(surface.plane.normal), *optics,
+            gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9,
+        )  # fmt: skip
+        if reachable.any():
+            once[draw], twice[draw] = (photos[reachable] >= 1).mean(), (photos[reachable] >= 2).mean()
+        lacks[draw] = photos < 2
+        tenths[draw] = np.minimum(best / gsd_mm_px * TENTHS_OF_PERCENT, np.iinfo(np.uint16).max)
+    most = np.partition(tenths, int(np.ceil(0.95 * draws)) - 1, axis=0)[int(np.ceil(0.95 * draws)) - 1]
+    mm_px = np.where(most < np.iinfo(np.uint16).max, most * gsd_mm_px / TENTHS_OF_PERCENT, np.inf)
+    worst = np.argsort(twice, kind="stable")[: max(1, draws // 10)]
+    return Drawn(once, twice, lacks[worst].mean(axis=0), mm_px)
+
+
+def position_errors(times_s: Array, vehicle: Vehicle, rng: np.random.Generator) -> Array:
+    """(P, 3) metres: a bias that walks (Ornstein-Uhlenbeck, exact between photos) and jitter."""
+    steps = np.exp(-np.abs(np.diff(times_s)) / BIAS_S)
+    noise = rng.standard_normal((len(times_s), 3))
+    bias = np.empty((len(times_s), 3))
+    for p in range(len(times_s)):
+        kept = steps[p - 1] if p else 0.0
+        bias[p] = kept * (bias[p - 1] if p else 0.0) + np.sqrt(1 - kept**2) * noise[p]
+    jitter = rng.standard_normal((len(times_s), 3))
+    return np.asarray(vehicle.position_bias_m * bias + vehicle.position_jitter_m * jitter)
+
+
+def reasons(seen: Seen, unreachable: Mapping[str, float]) -> tuple[str, ...]:
+    """Why parts of the surface are not seen, in words with their areas; empty where all of it is.
+
+    unreachable: m² by the reason why no place allows to see them; what else is missed is a photo's fault."""
+    told = [f"{area:.2f} m² {reason}" for reason, area in unreachable.items()]
+    missed = float((seen.photos == 0).sum()) * seen.cell_m**2 - sum(unreachable.values())
+    if missed > seen.cell_m**2 / 2:
+        told.append(f"{missed:.2f} m² in no photo at the asked size of pixels and angle")
     return tuple(told)
 
 
@@ -93,35 +195,90 @@ def _samples(surface: Surface, spacing_m: float) -> tuple[Array, float]:
     return np.column_stack([u[inside], v[inside]]), cell
 
 
-def _in_frame(camera: Camera, pose: CameraPose, points_m: Array) -> npt.NDArray[np.int64]:
-    """Indices of the (N, 3) points that a photo shows. Points far off the axis are taken out first, since
-    the distortion's polynomial can fold them back into the frame."""
-    corners = [(-0.5, -0.5), (camera.width_px - 0.5, -0.5), (-0.5, camera.height_px - 0.5)]
-    corners.append((camera.width_px - 0.5, camera.height_px - 0.5))
-    forward = pose.R_world_camera[:, 2]
-    widest = float((camera.back_project(corners, pose) @ forward).min())
-    ray = points_m - np.asarray(pose.position_m)
-    near_axis = np.flatnonzero(ray @ forward >= (widest - 1e-6) * np.linalg.norm(ray, axis=1))
-    pixels = camera.project(points_m[near_axis], pose) + 0.5
-    inside = np.all((pixels >= 0) & (pixels <= (camera.width_px, camera.height_px)), axis=1)
-    return near_axis[inside]
+def _optics(camera: Camera) -> tuple[tuple[float, ...], float]:
+    """What the kernels need of a camera, and the squared ideal radius beyond which its distortion folds
+    points back into the frame."""
+    cx, cy = camera.principal_px
+    right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
+    corners = np.array([(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)])
+    ideal = camera.undistort((corners - camera.principal_px) / camera.focal_px)
+    size = float(camera.width_px), float(camera.height_px)
+    return (camera.focal_px, cx, cy, *size, *camera.distortion), float((ideal**2).sum(axis=1).max()) * (
+        1 + 1e-6
+    )
 
 
-def _view_of(surface: Surface, camera: Camera, pose: CameraPose, points_m: Array) -> tuple[Array, Array]:
-    """Cosine of the incidence and ground sample distance (mm/px, along its worst direction) of (N, 3) points.
+@njit(cache=True)
+def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def]
+    """Whether a photo's frame holds a point; the cosine of its incidence, and the ground sample distance
+    (mm/px) along its worst direction.
 
-    A point seen at normalised (x, y) lies at z·(x, y, 1) with z = c / (n·(x, y, 1)); the derivatives with
-    respect to x and y, over the focal length, are a pixel's sides on the surface.
-    """
-    ray = (points_m - np.asarray(pose.position_m)) @ pose.R_world_camera  # in camera coordinates
-    normal = np.asarray(surface.plane.normal) @ pose.R_world_camera
-    z = ray[:, 2:]
-    direction = ray / z
-    towards = direction @ normal
-    slope = -(z[:, 0] / towards)[:, None]
-    side_x = z * [1.0, 0.0, 0.0] + slope * normal[0] * direction
-    side_y = z * [0.0, 1.0, 0.0] + slope * normal[1] * direction
-    xx, yy, xy = ((a * b).sum(axis=1) for a, b in ((side_x, side_x), (side_y, side_y), (side_x, side_y)))
-    largest = (xx + yy) / 2 + np.sqrt(((xx - yy) / 2) ** 2 + xy**2)
-    cos_incidence = -towards / np.linalg.norm(direction, axis=1)
-    return cos_incidence, np.sqrt(largest) * 1000.0 / camera.focal_px
+    A point seen at ideal (x, y) lies at z·(x, y, 1) with z = c / (n·(x, y, 1)); the derivatives with respect
+    to x and y, over the focal length, are a pixel's sides on the surface."""
+    dx, dy, dz = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
+    z = R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz
+    if z <= 1e-9:
+        return False, 0.0, np.inf
+    x = (R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) / z
+    y = (R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz) / z
+    nx = R[0, 0] * normal[0] + R[1, 0] * normal[1] + R[2, 0] * normal[2]
+    ny = R[0, 1] * normal[0] + R[1, 1] * normal[1] + R[2, 1] * normal[2]
+    nz = R[0, 2] * normal[0] + R[1, 2] * normal[1] + R[2, 2] * normal[2]
+    r2 = x * x + y * y
+    if r2 > widest:
+        return False, 0.0, np.inf
+    f, cx, cy, width, height, k1, k2, p1, p2, k3 = optics
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    column = f * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx + 0.5
+    row = f * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy + 0.5
+    inside = 0 <= column <= width and 0 <= row <= height
+    towards = x * nx + y * ny + nz
+    if towards >= -1e-9:
+        return inside, 0.0, np.inf
+    slope = -z / towards
+    ax, ay, az = z + slope * nx * x, slope * nx * y, slope * nx
+    bx, by, bz = slope * ny * x, z + slope * ny * y, slope * ny
+    aa, bb, ab = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, ax * bx + ay * by + az * bz
+    largest = (aa + bb) / 2 + np.sqrt(((aa - bb) / 2) ** 2 + ab * ab)
+    return inside, -towards / np.sqrt(r2 + 1), np.sqrt(largest) * 1000 / f
+
+
+@njit(cache=True)
+def _count(  # type: ignore[no-untyped-def]
+    eyes, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos,
+    photos, well, hidden, oblique, coarse, best,
+):  # fmt: skip
+    for p in range(len(eyes)):
+        for k in range(first[p], first[p + 1]):
+            s = samples[k]
+            inside, cos, size = _view(points[s], eyes[p], turns[p], normal, optics, widest)
+            if not inside:
+                continue
+            if not visible[k]:
+                hidden[s] = True
+            elif cos < least_cos:
+                oblique[s] = True
+            else:
+                best[s] = min(best[s], size)
+                if size > gsd:
+                    coarse[s] = True
+                else:
+                    photos[s] += 1
+                    well[k] = True
+
+
+@njit(cache=True)
+def _photos_of(  # type: ignore[no-untyped-def]
+    eyes, places, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos
+):
+    photos = np.zeros(len(points), dtype=np.int64)
+    best = np.full(len(points), np.inf)
+    for p in range(len(eyes)):
+        for k in range(first[p], first[p + 1]):
+            if visible[places[p], k]:
+                s = samples[k]
+                inside, cos, size = _view(points[s], eyes[p], turns[p], normal, optics, widest)
+                if inside and cos >= least_cos:
+                    best[s] = min(best[s], size)
+                    photos[s] += size <= gsd
+    return photos, best

@@ -1,22 +1,73 @@
 """Where the vehicle takes off and lands: a free place on the ground, with a free way up."""
 
 from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from schemas.contract import Vector3
 from schemas.problem import BadInput
 from tasks.planning.airspace import Airspace
-from tasks.planning.occupancy import VoxelGrid
+from tasks.planning.astar import Cell
+from tasks.planning.occupancy import REACH, VoxelGrid
+from tasks.planning.refusals import no_way
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 ROUGH_M = 0.3  # what rises less than this, or less steeply than 20°, is ground to stand on
 STEEP = np.tan(np.radians(20.0))
 LEAST_CLIMB_M = 2.0  # a vehicle takes off to at least this height
 MOST_CLIMB_M = 10.0
+
+
+@dataclass(frozen=True)
+class Base:
+    """Where flights begin and end, and what can be reached from there."""
+
+    home_m: Vector3  # on the ground
+    top_m: Vector3  # end of the climb
+    gate: Cell  # the voxel through which the grid is entered from there
+    grid: VoxelGrid
+    airspace: Airspace
+
+    def leads_to(self, place_m: Vector3) -> Cell | None:
+        """The voxel through which a free place is entered, where a way leads there."""
+        entrance = self.grid.entrance(np.array(place_m), self.airspace)
+        if entrance is None or self.grid.component[entrance] != self.grid.component[self.gate]:
+            return None
+        return entrance
+
+    def ways_to(self, places_m: Array) -> Flags:
+        """(M,) whether a way leads to each of (M, 3) free places, as far as a look around it says."""
+        if not len(places_m):
+            return np.zeros(0, dtype=bool)
+        return np.asarray(self._within_reach[tuple(self.grid.cells(places_m).T)])
+
+    @cached_property
+    def _within_reach(self) -> Flags:
+        led_to = self.grid.component == self.grid.component[self.gate]
+        return np.asarray(ndimage.binary_dilation(led_to, iterations=REACH))
+
+
+def home_base(home_m: Vector3 | None, airspace: Airspace, grid: VoxelGrid, places_m: Array) -> Base:
+    """The given home, or one that is found as near as possible to the places to visit (N, 3).
+
+    Raises BadInput where there is none, or where no way leads from it to any of the places."""
+    entrances = [grid.entrance(place, airspace) for place in places_m]
+    components = Counter(int(grid.component[e]) for e in entrances if e is not None)
+    if home_m is None:
+        home, top = find_home(airspace, grid, components, places_m)
+    else:
+        home, top = home_m, take_off_place(home_m, airspace)
+    gate = grid.entrance(np.array(top), airspace)
+    if gate is None or int(grid.component[gate]) not in components:
+        raise no_way(home, airspace)
+    return Base(home, top, gate, grid, airspace)
 
 
 def take_off_place(home_m: Vector3, airspace: Airspace) -> Vector3:

@@ -11,6 +11,7 @@ from tasks.planning.airspace import Airspace
 Array = npt.NDArray[np.float64]
 Cells = npt.NDArray[np.int64]
 
+REACH = 4  # voxels around a place that it may be entered from
 MOST_CELLS = 16_000_000  # bounds memory: about 20 bytes a cell while the grid is built
 
 
@@ -35,10 +36,9 @@ class VoxelGrid:
     def entrance(self, place_m: Array, airspace: Airspace) -> tuple[int, int, int] | None:
         """The nearest free voxel that a straight flight from a free place reaches, or None. Near a surface
         a place may be free while its voxel is not, since a voxel answers for all of its volume."""
-        reach = 4
         (cell,) = self.cells(place_m)
-        low = np.maximum(cell - reach, 0)
-        block = self.free[tuple(slice(a, b) for a, b in zip(low, cell + reach + 1, strict=True))]
+        low = np.maximum(cell - REACH, 0)
+        block = self.free[tuple(slice(a, b) for a, b in zip(low, cell + REACH + 1, strict=True))]
         cells = np.argwhere(block) + low
         if not len(cells):
             return None
@@ -85,7 +85,9 @@ def voxel_grid(airspace: Airspace, low_m: Array, high_m: Array, voxel_m: float) 
     free &= (altitude >= airspace.min_altitude_m + voxel_m / 2) & (altitude <= airspace.max_altitude_m)
     if airspace.allowed is not None:
         for i in range(shape[0]):  # plane by plane: a place a cell takes a hundred bytes
-            columns = np.stack(np.meshgrid(*(np.arange(n) for n in shape[1:]), indexing="ij"), -1).reshape(-1, 2)
+            columns = np.stack(np.meshgrid(*(np.arange(n) for n in shape[1:]), indexing="ij"), -1).reshape(
+                -1, 2
+            )
             places = low_m + np.column_stack([np.full(len(columns), i), columns]) * voxel_m
             free[i] &= (airspace.allowed.slack_m(places) >= half_diagonal).reshape(shape[1:])
     component, _ = ndimage.label(free)  # face neighbours: a step that cuts no corner leaves none of them

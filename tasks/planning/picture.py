@@ -1,6 +1,6 @@
 """The plan drawn to a picture: inspected surfaces, the path, and where each photo is taken from."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +44,26 @@ def draw_plan(plan: FlightPlan, surfaces: Sequence[Surface]) -> npt.NDArray[np.u
             zlabel="up [m]",
         )
         axes.set_aspect("equal")
+    figure.tight_layout()
+    canvas.draw()  # type: ignore[no-untyped-call]
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()  # type: ignore[no-untyped-call]
+
+
+def draw_widths(maps: Mapping[str, npt.NDArray[np.float32]]) -> npt.NDArray[np.uint8]:
+    """(H, W, 3) RGB: of each surface the smallest measurable crack width; white where nothing is seen."""
+    columns = min(len(maps), 4) or 1
+    rows = max(1, -(-len(maps) // columns))
+    figure = Figure(figsize=(14, 2.6 * rows), dpi=100)
+    canvas = FigureCanvasAgg(figure)
+    known = [widths[np.isfinite(widths)] for widths in maps.values()]
+    low = min((float(w.min()) for w in known if w.size), default=0.0)
+    high = max((float(w.max()) for w in known if w.size), default=1.0)
+    for number, (name, widths) in enumerate(maps.items(), start=1):
+        axes = figure.add_subplot(rows, columns, number)
+        shown = axes.imshow(widths, cmap="viridis_r", vmin=low, vmax=max(high, low + 1e-6))
+        axes.set_title(name, fontsize=8)
+        axes.set_axis_off()
+        figure.colorbar(shown, ax=axes, label="mm", shrink=0.7)
     figure.tight_layout()
     canvas.draw()  # type: ignore[no-untyped-call]
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()  # type: ignore[no-untyped-call]

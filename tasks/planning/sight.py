@@ -93,8 +93,8 @@ def _thinned(points_m: Array, size_m: float) -> Array:
 def _on_a_surface(surfaces: Sequence[Surface], points_m: Array) -> Flags:
     explained = np.zeros(len(points_m), dtype=bool)
     for surface in surfaces:
-        u, v, w = surface.to_surface(points_m).T
-        near = np.flatnonzero((np.abs(w) < THICKNESS_M) & ~explained)
+        near = np.flatnonzero((np.abs(surface.plane.signed_distance_m(points_m)) < THICKNESS_M) & ~explained)
+        u, v, _ = surface.to_surface(points_m[near]).T
         area = outline_of(surface).buffer(THICKNESS_M)
-        explained[near] = shapely.contains_xy(area, u[near], v[near])
+        explained[near] = shapely.contains_xy(area, u, v)
     return explained

@@ -3,6 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from artifacts import store
 from artifacts.page import Page
 from artifacts.picture import markdown_of
@@ -15,24 +18,39 @@ from schemas.structure import Structure
 from schemas.vehicle import Vehicle
 from tasks.stage import progress, stage
 
+Widths = npt.NDArray[np.float32]
+
 
 def pages(inputs: Mapping[str, Any], made: FlightPlan) -> list[Page]:
-    from tasks.planning.picture import draw_plan
+    from tasks.planning.picture import draw_plan, draw_widths
 
     structure: Structure = inputs["structure"]
     lines = [
         "### Flight plan",
         f"{len(made.shooting_points)} photos, {made.length_m:.0f} m, {made.duration_s / 60:.1f} min,"
-        f" overlap {made.overlap:.0%}.",
-        "| surface | area m² | covered | stand-off m | mm/px | photos | not reached |",
-        "|---|---|---|---|---|---|---|",
+        f" overlap {made.overlap:.0%}, {len(made.each_flight)} of a battery each.",
+        "| surface | area m² | covered | can be reached | of it in two photos | in 95 of 100 flights"
+        " | measurable mm | stand-off m | mm/px | photos | not reached |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
         *(
-            f"| {c.surface} | {c.area_m2:.2f} | {c.covered:.1%} | {c.stand_off_m:.2f} | {c.gsd_mm_px:.2f}"
+            f"| {c.surface} | {c.area_m2:.2f} | {c.covered:.1%} | {c.reachable:.1%} | {c.twice or 0:.1%}"
+            f" | {c.twice_p05 or 0:.1%} | {c.measurable_mm or 0:.2f} | {c.stand_off_m:.2f} | {c.gsd_mm_px:.2f}"
             f" | {c.photos} | {'; '.join(c.not_reached)} |"
             for c in made.coverage
         ),
         "",
+        "| flight | photos | m | min | of a battery |",
+        "|---|---|---|---|---|",
+        *(
+            f"| {n} | {f.photos} | {f.length_m:.0f} | {f.duration_s / 60:.1f} | {f.battery:.0%} |"
+            for n, f in enumerate(made.flights, start=1)
+        ),
+        "",
         markdown_of(draw_plan(made, structure.surfaces), "flight plan"),
+        "",
+        "Smallest crack width that can be measured, surface by surface:",
+        "",
+        markdown_of(draw_widths(width_maps(made)), "measurable widths"),
     ]
     rows = [
         {
@@ -60,8 +78,28 @@ def plan_flight(
     settings: PlanSettings,
 ) -> FlightPlan:
     """Shooting points over the surfaces to inspect, a tour of them, a collision-free path, and its proof."""
-    from tasks.planning.occupied_points import read_points
-    from tasks.planning.plan import plan
+    import tifffile
 
-    points = read_points(store.current().path(structure.occupied))
-    return plan(structure, points, camera, vehicle, origin, home_m, settings, progress)
+    from tasks.planning.occupied_points import read_points
+    from tasks.planning.plan import plan_and_prove
+
+    shelf = store.current()
+    points = read_points(shelf.path(structure.occupied))
+    made, maps = plan_and_prove(structure, points, camera, vehicle, origin, home_m, settings, progress)
+    coverage = []
+    with shelf.scratch() as folder:
+        for of_surface, widths in zip(made.coverage, maps, strict=True):
+            path = folder / "width_mm.tif"
+            tifffile.imwrite(path, widths.width_mm, compression="zlib", metadata=None)
+            coverage.append(of_surface.model_copy(update={"width_map": shelf.put(path)}))
+    return made.model_copy(update={"coverage": tuple(coverage)})
+
+
+def width_maps(made: FlightPlan) -> dict[str, Widths]:
+    """Of each surface by name the smallest measurable width, (H, W) float32 mm, its top first."""
+    import tifffile
+
+    shelf = store.current()
+    return {
+        c.surface: tifffile.imread(shelf.path(c.width_map)) for c in made.coverage if c.width_map is not None
+    }

@@ -51,17 +51,31 @@ def landing_s(height_m: float) -> float:
     return min(max(height_m, 0.0), SLOW_BELOW_M) / LANDING_M_S
 
 
-def duration_s(home_m: Vector3, waypoints: Sequence[Waypoint], vehicle: Vehicle, camera: Camera) -> float:
-    """Flight time from take-off to landing at home, a full stop at every waypoint."""
-    places = np.array([home_m, *(w.position_m for w in waypoints), home_m])
-    travel = travel_s(np.linalg.norm(np.diff(places, axis=0), axis=1), vehicle)
-    seconds = float(travel.sum())
-    yaw = waypoints[0].yaw_deg if waypoints else 0.0
-    on_the_way = 0.0
-    for waypoint, leg in zip(waypoints, travel, strict=False):
-        on_the_way += float(leg)
+def shot_times_s(
+    home_m: Vector3, waypoints: Sequence[Waypoint], vehicle: Vehicle, camera: Camera
+) -> tuple[Array, float]:
+    """When each photo of a flight is taken, seconds since take-off, and when the last waypoint is left: a full
+    stop at every waypoint."""
+    seconds, on_the_way = 0.0, 0.0
+    here, yaw = np.asarray(home_m), waypoints[0].yaw_deg if waypoints else 0.0
+    times: list[float] = []
+    for waypoint in waypoints:
+        there = np.asarray(waypoint.position_m)
+        leg = float(travel_s(np.linalg.norm(there - here), vehicle))
+        seconds, on_the_way, here = seconds + leg, on_the_way + leg, there
         if waypoint.kind == "shooting":
             turn = float(turn_s(yaw, waypoint.yaw_deg, vehicle))
             seconds += shooting_s(turn, on_the_way, vehicle, camera)
+            times.append(seconds)
             yaw, on_the_way = waypoint.yaw_deg, 0.0
-    return seconds + (landing_s(waypoints[-1].position_m[2] - home_m[2]) if waypoints else 0.0)
+    return np.array(times), seconds
+
+
+def duration_s(home_m: Vector3, waypoints: Sequence[Waypoint], vehicle: Vehicle, camera: Camera) -> float:
+    """Flight time from take-off to landing at home."""
+    if not waypoints:
+        return 0.0
+    last = np.asarray(waypoints[-1].position_m)
+    _, seconds = shot_times_s(home_m, waypoints, vehicle, camera)
+    down = float(travel_s(np.linalg.norm(last - home_m), vehicle))
+    return seconds + down + landing_s(float(last[2]) - home_m[2])

@@ -145,32 +145,63 @@ def shooting_points(
     footprint = camera.footprint_m(stand_off_m)
     places, uv = shooting_grid(surface, footprint, overlap, vehicle.sideways_error_m)
     targets = surface.to_world(uv)
-    right = surface.R_world_surface[:, :2] @ grid_turn(surface)[:, 0]
     seen_at = surface.to_world(_nearest_inside(surface, uv))
-    chosen: dict[int, View] = {}
-    refused = np.full(len(targets), "", dtype=object)
-    left = np.arange(len(targets))
-    for forward, incidence in _directions(surface, camera, settings.max_incidence_deg):
+    aimed = aim(surface, vehicle, stand_off_m, targets, seen_at, settings.max_incidence_deg, airspace, scene)
+    views = tuple(
+        View(surface.name, int(row), int(column), target, *aimed.found[i])
+        for i, ((row, column), target) in enumerate(zip(places, targets, strict=True))
+        if i in aimed.found
+    )
+    wanted = targets + stand_off_m * np.asarray(surface.plane.normal)
+    return Views(stand_off_m, views, Counter(aimed.refused.values()), wanted)
+
+
+@dataclass(frozen=True)
+class Aimed:
+    """Of each target by number: a pose that sees it and its incidence in degrees, or why there is none."""
+
+    found: dict[int, tuple[CameraPose, float]]
+    refused: dict[int, str]
+
+
+def aim(
+    surface: Surface,
+    vehicle: Vehicle,
+    stand_off_m: float,
+    targets_m: Array,
+    seen_at_m: Array,
+    max_incidence_deg: float,
+    airspace: Airspace,
+    scene: Scene,
+) -> Aimed:
+    """The least oblique free place from which each target (N, 3) is looked at and its stand-in on the
+    surface, seen_at_m (N, 3), is seen. What is refused has the reason of the perpendicular view."""
+    right = surface.R_world_surface[:, :2] @ grid_turn(surface)[:, 0]
+    found: dict[int, tuple[CameraPose, float]] = {}
+    refused: dict[int, str] = {}
+    left = np.arange(len(targets_m))
+    for forward, incidence in _directions(surface, max_incidence_deg):
         if not left.size:
             break
         yaw, pitch, flown = camera_towards(forward[None], right)
         # Obliquely, a pixel stretches by 1 / cos(incidence): come closer to keep the ground sample distance.
-        positions = targets[left] - flown[0] * stand_off_m * np.cos(incidence)
-        reasons = _reasons(positions, seen_at[left], float(pitch[0]), vehicle, airspace, scene)
-        for i, position, reason in zip(left, positions, reasons, strict=True):
-            refused[i] = refused[i] or reason
-            if not reason:
-                pose = CameraPose(
-                    position_m=tuple(round(float(x), 4) for x in position),
-                    yaw_deg=round(float(yaw[0]), 4) % 360.0,
-                    pitch_deg=round(float(pitch[0]), 4) + 0.0,  # no minus zero
-                )
-                row, column = (int(n) for n in places[i])
-                chosen[int(i)] = View(surface.name, row, column, targets[i], pose, math.degrees(incidence))
+        positions = targets_m[left] - flown[0] * stand_off_m * np.cos(incidence)
+        reasons = _reasons(
+            positions, seen_at_m[left], float(pitch[0]), vehicle, airspace, scene, told=incidence == 0.0
+        )
+        for i, position, reason in zip(left.tolist(), positions, reasons, strict=True):
+            if reason:
+                refused.setdefault(i, reason)
+                continue
+            pose = CameraPose(
+                position_m=tuple(round(float(x), 4) for x in position),
+                yaw_deg=round(float(yaw[0]), 4) % 360.0,
+                pitch_deg=round(float(pitch[0]), 4) + 0.0,  # no minus zero
+            )
+            found[i] = pose, math.degrees(incidence)
+            refused.pop(i, None)
         left = left[reasons != ""]
-    views = tuple(chosen[i] for i in sorted(chosen))
-    wanted = targets + stand_off_m * np.asarray(surface.plane.normal)
-    return Views(stand_off_m, views, Counter(str(refused[i]) for i in left), wanted)
+    return Aimed(found, refused)
 
 
 def _nearest_inside(surface: Surface, uv: Array) -> Array:
@@ -180,7 +211,7 @@ def _nearest_inside(surface: Surface, uv: Array) -> Array:
     return np.asarray(shapely.get_coordinates(shapely.get_point(lines, 0)))
 
 
-def _directions(surface: Surface, camera: Camera, max_incidence_deg: float) -> list[tuple[Array, float]]:
+def _directions(surface: Surface, max_incidence_deg: float) -> list[tuple[Array, float]]:
     """View directions and incidences (radians), the perpendicular first, then rings of obliques. The most
     oblique still sees the nearer half of its footprint within the limit."""
     into = -np.asarray(surface.plane.normal)
@@ -197,9 +228,15 @@ def _directions(surface: Surface, camera: Camera, max_incidence_deg: float) -> l
 
 
 def _reasons(
-    positions: Array, targets: Array, pitch_deg: float, vehicle: Vehicle, airspace: Airspace, scene: Scene
+    positions: Array,
+    targets: Array,
+    pitch_deg: float,
+    vehicle: Vehicle,
+    airspace: Airspace,
+    scene: Scene,
+    told: bool,
 ) -> npt.NDArray[np.object_]:
-    """(N,) why each place cannot be used, in words; empty where it can."""
+    """(N,) why each place cannot be used, in words; empty where it can. Unless told, any word will do."""
     limits = vehicle.gimbal_pitch_min_deg, vehicle.gimbal_pitch_max_deg
     if not limits[0] - 1e-6 <= pitch_deg <= limits[1] + 1e-6:
         return np.full(
@@ -214,7 +251,10 @@ def _reasons(
         Block.FENCE: OUTSIDE,
         Block.NO_FLY: NO_FLY,
     }
-    reasons = np.array([words[Block(b)] for b in airspace.blocks(positions)], dtype=object)
+    if told:
+        reasons = np.array([words[Block(b)] for b in airspace.blocks(positions)], dtype=object)
+    else:
+        reasons = np.where(airspace.is_free(positions), "", "not free").astype(object)
     free = np.flatnonzero(reasons == "")
     if free.size:
         reasons[free[~scene.sees(positions[free], targets[free])]] = "hidden behind something"

@@ -78,9 +78,13 @@ def test_the_dji_mission_carries_every_waypoint_and_its_photo(tmp_path: Path) ->
             longitude, latitude = map(float, placemark.findtext(".//k:coordinates", "", WPML).split(","))
             expected = plan.origin.to_geographic(waypoint.position_m)
             assert (latitude, longitude) == pytest.approx(expected[:2], abs=1e-8)
-            height = placemark.findtext("w:executeHeight", None, WPML) or placemark.findtext("w:height", "", WPML)
+            height = placemark.findtext("w:executeHeight", None, WPML) or placemark.findtext(
+                "w:height", "", WPML
+            )
             assert float(height) == pytest.approx(waypoint.position_m[2] - plan.home_m[2], abs=1e-3)
-            assert placemark.findtext("w:waypointTurnParam/w:waypointTurnMode", "", WPML).startswith("toPointAndStop")
+            assert placemark.findtext("w:waypointTurnParam/w:waypointTurnMode", "", WPML).startswith(
+                "toPointAndStop"
+            )
             does = [a.text for a in placemark.findall(".//w:actionActuatorFunc", WPML)]
             shoots = ["gimbalRotate", "rotateYaw", "hover", "takePhoto"]
             assert does == (shoots if waypoint.kind == "shooting" else [])

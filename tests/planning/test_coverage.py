@@ -1,14 +1,12 @@
 """Coverage by ray casting against areas known by construction."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 
 from schemas.camera import CameraPose
 from schemas.settings import PlanSettings
 from tasks.planning.airspace import Airspace
-from tasks.planning.coverage import reasons, seen_by
+from tasks.planning.coverage import BIAS_S, drawn, position_errors, reasons, seen_by
 from tasks.planning.sight import Scene
 from tasks.planning.viewpoints import shooting_points
 from tests.planning.structures import CAMERA, VEHICLE, box, rectangle, wall
@@ -36,7 +34,7 @@ def test_a_free_wall_is_covered_whole_from_exact_poses() -> None:
     assert seen.covered >= 0.995
     inner = np.abs(seen.uv_m).max(axis=1) < 1.0
     assert (seen.photos[inner] >= 2).mean() > 0.99
-    assert reasons(seen, Counter()) == ()
+    assert reasons(seen, {}) == ()
 
 
 def test_a_bias_of_two_sigma_leaves_no_border_unseen() -> None:
@@ -63,7 +61,7 @@ def test_what_hides_the_wall_is_taken_off_and_named() -> None:
     hidden = (bare.covered - seen.covered) * 24.0
     shade = 0.6 * 4.0 / 2.8 * 1.224  # of its front edges, 1.2 m off the wall and 2.8 m off the camera
     assert shade - 0.1 < hidden < (0.6 + 0.2) / 0.6 * shade + 0.1  # points stand for cubes 10 cm beyond them
-    assert any("hidden" in r for r in reasons(seen, Counter()))
+    assert reasons(seen, {"hidden behind something": hidden})[0] == f"{hidden:.2f} m² hidden behind something"
 
 
 def test_too_far_and_too_oblique_do_not_count() -> None:
@@ -79,17 +77,55 @@ def test_too_far_and_too_oblique_do_not_count() -> None:
 @pytest.mark.parametrize("yaw", [0.0, 15.0, 40.0])
 def test_the_ground_sample_distance_of_an_oblique_view(yaw: float) -> None:
     """At the image's middle a pixel covers distance / focal, stretched by 1 / cos(incidence)."""
-    from tasks.planning.coverage import _view_of
-
     angle = np.radians(yaw)
     pose = CameraPose(position_m=(-4 * np.sin(angle), -4 * np.cos(angle), 5.0), yaw_deg=yaw, pitch_deg=0.0)
-    cos_incidence, gsd = _view_of(WALL, CAMERA, pose, np.array([[0.0, 0.0, 5.0]]))
-    assert cos_incidence[0] == pytest.approx(np.cos(angle))
-    assert gsd[0] == pytest.approx(1.0 / np.cos(angle))
-    # And by projecting: one pixel's step along the wall at the image's middle.
+    seen = seen_by(WALL, CAMERA, [pose], 1.0, 79.0, ALONE)
+    middle = np.argmin(np.linalg.norm(seen.uv_m, axis=1))
+    u, v = seen.uv_m[middle]
+    # By projecting: a pixel's steps along and up the wall.
     step = 1e-4
-    ahead = CAMERA.project([[0.0, 0.0, 5.0], [step, 0.0, 5.0]], pose)
-    assert gsd[0] == pytest.approx(step * 1000 / np.linalg.norm(np.diff(ahead, axis=0)), rel=1e-3)
+    places = WALL.to_world([(u, v), (u + step, v), (u, v + step)])
+    pixels = CAMERA.project(places, pose)
+    largest = step * 1000 / np.linalg.norm(pixels[1:] - pixels[0], axis=1).min()
+    assert seen.best_mm_px[middle] == pytest.approx(largest, rel=2e-3)
+    assert seen.best_mm_px[middle] == pytest.approx(1.0 / np.cos(angle), rel=0.02)
+
+
+def test_the_position_error_walks_and_jitters_as_stated() -> None:
+    vehicle = VEHICLE.model_copy(update={"position_bias_m": 0.5, "position_jitter_m": 0.2})
+    rng = np.random.default_rng(0)
+    times = np.array([0.0, 1.0, BIAS_S, BIAS_S + 1e6])
+    errors = np.array([position_errors(times, vehicle, rng) for _ in range(4000)])
+    assert errors.std(axis=0) == pytest.approx(np.full((4, 3), np.hypot(0.5, 0.2)), rel=0.06)
+    together = [(errors[:, 0] * errors[:, k]).mean() / 0.5**2 for k in (1, 2, 3)]
+    assert together == pytest.approx([np.exp(-1 / BIAS_S), np.exp(-1), 0.0], abs=0.06)
+
+
+def test_a_grid_of_photos_is_lost_where_the_error_takes_it() -> None:
+    """One photo that shows just half of a strip: seen once in as many draws as the error leaves it there."""
+    strip = rectangle("wall-01", (0.0, 0.0, 5.0), (0, -1, 0), 0.1, 0.1)
+    half_m = 1.632 / 2 * (3.5 / 4.0)
+    vehicle = VEHICLE.model_copy(update={"position_bias_m": 0.1, "position_jitter_m": 0.0})
+    poses = [from_the_south(half_m - 0.05, 5.0, 3.5)] * 2  # the strip is 5 cm inside its left edge
+    errs = drawn(
+        strip, CAMERA, poses, np.array([0.0, 0.0]), vehicle, 1.0, 45.0, Scene([strip], np.empty((0, 3))),
+        np.ones(len(seen_by(strip, CAMERA, poses, 1.0, 45.0, ALONE).uv_m), dtype=bool), draws=2000,
+    )  # fmt: skip
+    lost = (errs.twice < 0.5).mean()
+    assert lost == pytest.approx(0.3085, abs=0.04)  # P(bias east > σ / 2)
+    assert np.array_equal(errs.once, errs.twice)  # a bias that is shared takes both
+
+
+def test_a_width_can_be_measured_where_its_pixels_are_small_enough_in_95_of_100_flights() -> None:
+    vehicle = VEHICLE.model_copy(update={"position_bias_m": 0.2, "position_jitter_m": 0.0})
+    seen = seen_by(WALL, CAMERA, [from_the_south(0.0, 5.0)], 1.0, 45.0, ALONE)
+    errs = drawn(
+        WALL, CAMERA, [from_the_south(0.0, 5.0)], np.zeros(1), vehicle, 1.0, 45.0, ALONE,
+        seen.photos > 0, draws=2000,
+    )  # fmt: skip
+    middle = np.argmin(np.linalg.norm(seen.uv_m, axis=1))
+    assert errs.mm_px[middle] == pytest.approx((4.0 + 1.645 * 0.2) / 4.0, abs=0.01)
+    assert np.isinf(errs.mm_px[np.abs(seen.uv_m[:, 0]) > 2.0]).all()
 
 
 def test_strong_distortion_does_not_fold_far_points_into_the_photo() -> None:

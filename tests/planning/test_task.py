@@ -13,7 +13,7 @@ from schemas.problem import BadInput
 from schemas.settings import PlanSettings
 from schemas.structure import Structure
 from tasks.planning.occupied_points import read_points
-from tasks.planning.task import pages, plan_flight
+from tasks.planning.task import pages, plan_flight, width_maps
 from tests.planning.structures import CAMERA, OPEN, ORIGIN, VEHICLE, wall
 
 
@@ -29,9 +29,15 @@ def test_the_stage_plans_from_the_store_and_draws_it() -> None:
     world = wall()
     with store.temporary():
         structure = stored(world.structure, world.cloud)
-        made = plan_flight.bare(structure, CAMERA, VEHICLE, ORIGIN, None, PlanSettings(gsd_mm_px=1.0, free_m=(OPEN,)))
-    assert made.coverage[0].covered >= 0.995
-    shown, table = pages({"structure": structure}, made)
+        made = plan_flight.bare(
+            structure, CAMERA, VEHICLE, ORIGIN, None, PlanSettings(gsd_mm_px=1.0, free_m=(OPEN,))
+        )
+        assert made.coverage[0].covered >= 0.995
+        (widths,) = width_maps(made).values()
+        assert np.isfinite(widths).mean() > 0.97  # all of the wall but half a row of squares
+        assert np.nanmax(widths) <= 3.0 * 1.02  # three pixels of 1 mm
+        assert np.nanmin(widths) >= 3.0 * made.coverage[0].gsd_mm_px * 0.9
+        shown, table = pages({"structure": structure}, made)
     assert len(table.table) == len(made.waypoints)
     picture = base64.b64decode((shown.markdown or "").split("base64,")[1].split(")")[0])
     drawn = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
