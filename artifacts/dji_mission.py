@@ -102,7 +102,7 @@ def _placemark(folder: Element, plan: FlightPlan, index: int, waypoint: Waypoint
         actionGroupMode="sequence",
     )
     _group(group, "actionTrigger", actionTriggerType="reachPoint")
-    pitch = {
+    pitch: dict[str, str | float] = {
         "gimbalHeadingYawBase": "north",
         "gimbalRotateMode": "absoluteAngle",
         "gimbalPitchRotateEnable": 1,

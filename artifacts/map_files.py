@@ -1,4 +1,4 @@
-"""A plan to look at: KML (path, shooting points and views in any globe) and CSV (every waypoint in a table)."""
+"""A plan to look at: KML (path, shooting points, views in any globe) and CSV (every waypoint in a table)."""
 
 import csv
 from pathlib import Path
@@ -7,6 +7,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from schemas.contract import Vector3
 from schemas.flight_plan import FlightPlan
 
+COLUMNS = (
+    *("waypoint", "kind", "latitude_deg", "longitude_deg", "height_above_home_m"),
+    *("east_m", "north_m", "up_m", "yaw_deg", "pitch_deg", "surface", "photo"),
+)
 GAZE_M = 1.0  # of the line drawn along each view
 
 
@@ -53,10 +57,7 @@ def _coordinates(plan: FlightPlan, place: Vector3) -> str:
 def write_csv(plan: FlightPlan, path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
         table = csv.writer(stream, lineterminator="\n")
-        table.writerow(
-            "waypoint kind latitude_deg longitude_deg height_above_home_m east_m north_m up_m yaw_deg pitch_deg"
-            " surface photo".split()
-        )
+        table.writerow(COLUMNS)
         for number, w in enumerate(plan.waypoints, start=1):
             latitude, longitude, _ = plan.origin.to_geographic(w.position_m)
             place = [f"{latitude:.9f}", f"{longitude:.9f}", f"{w.position_m[2] - plan.home_m[2]:.3f}"]

@@ -55,8 +55,8 @@ def write_structure(folder: Path, structure: Structure, copy: bool = False) -> N
 
 
 def write_flight_plan(folder: Path, plan: FlightPlan, copy: bool = False) -> None:
-    """plan.json; SURFACE.width_mm.tif, the smallest measurable width at each place; and the mission files, one of
-    each kind a flight: mission.*, mission-2.*, …"""
+    """plan.json; SURFACE.width_mm.tif, the smallest measurable width at each place; the mission files, one
+    of each kind a flight: mission.*, mission-2.*, …"""
     write_json(folder / "plan.json", plan)
     maps = {f"{c.surface}.width_mm.tif": c.width_map for c in plan.coverage if c.width_map is not None}
     lay_out(folder, maps, copy=copy)

@@ -50,7 +50,7 @@ class PlanSettings(Contract):
 
     @property
     def asked_gsd_mm_px(self) -> float:
-        """The ground sample distance of the request: to detect a crack takes its width, to measure it a third."""
+        """Ground sample distance of the request: to detect a crack takes its width, to measure it a third."""
         if self.gsd_mm_px is not None:
             return self.gsd_mm_px
         return min(self.smallest_crack_mm, (self.smallest_measured_mm or math.inf) / 3)

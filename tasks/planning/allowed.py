@@ -22,9 +22,7 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 MOST_CELLS = 12_000_000  # bounds memory: about 25 bytes a cell while distances are found
-SPECK = np.ones(
-    (2, 2, 2), dtype=bool
-)  # unknown spots thinner than two voxels are the raster's, not the world's
+SPECK = np.ones((2, 2, 2), dtype=bool)  # thinner unknown spots are the raster's, not the world's
 
 DIRECTIONS = np.array(list(product((-1, 0, 1), repeat=3)))
 
@@ -59,9 +57,10 @@ class Allowed:
         return np.clip(index, 0, np.array(self.why.shape) - 1), inside
 
     def slack_m(self, places_m: Array) -> Array:
-        """(M,) how far each of (M, 3) places may move in any direction and stays allowed; negative: is not."""
+        """(M,) how far each of (M, 3) places may move in any direction and stay allowed; negative: is not."""
         index, inside = self._cells(places_m)
-        return np.where(inside, self._distance_m[tuple(index.T)] - self._short_m, -self._short_m)
+        slack = self._distance_m[tuple(index.T)].astype(np.float64) - self._short_m
+        return np.asarray(np.where(inside, slack, -self._short_m))
 
     def reasons(self, places_m: Array) -> npt.NDArray[np.int64]:
         """(M,) Block of what is not allowed near each place without slack, FREE for those with."""
@@ -96,7 +95,8 @@ def allowed_region(
         )
     extent = high_m - low_m
     voxel_m = max(settings.voxel_m, float(np.cbrt(extent.prod() / MOST_CELLS)))
-    shape = tuple(int(n) + 1 for n in np.ceil(extent / voxel_m))
+    nx, ny, nz = (int(n) + 1 for n in np.ceil(extent / voxel_m))
+    shape = nx, ny, nz
     known = seen_free(low_m, voxel_m, shape, points_m, structure.stations_m, settings.scanner_reach_m)
     known = ~ndimage.binary_opening(~known, SPECK)
     axes = [low_m[k] + np.arange(shape[k]) * voxel_m for k in range(3)]

@@ -1,5 +1,5 @@
-"""What the grid of shooting points misses: photos added where a place allows them, useless ones taken out, and
-the area that no place allows to see, with the reason."""
+"""What the grid of shooting points misses: photos added where a place allows them, useless ones taken out,
+and the area that no place allows to see, with the reason."""
 
 import math
 from collections import Counter
@@ -59,7 +59,9 @@ def complete(
     seen = seen_by(surface, camera, poses, gsd_mm_px, settings.max_incidence_deg, scene, samples)
 
     def flown(views: tuple[View, ...]) -> Drawn:
-        times = PHOTO_S * np.arange(len(views))  # about; the order of flying is not known yet
+        times = PHOTO_S * np.arange(
+            len(views), dtype=np.float64
+        )  # about; the order of flying is not known yet
         return drawn(
             surface, camera, [v.pose for v in views], times, vehicle, gsd_mm_px, settings.max_incidence_deg,
             scene, reachable, samples, FEW_DRAWS,
@@ -79,10 +81,10 @@ def complete(
     reachable = (seen.photos > 0) | known
     never = np.flatnonzero(~reachable)
     share = samples.cell_m**2 * len(missed) / max(len(asked), 1)
-    areas: Counter[str] = Counter()
+    areas: dict[str, float] = {}
     for number, reason in refused.items():
         if not reachable[asked[number]]:
-            areas[reason] += share
+            areas[reason] = areas.get(reason, 0.0) + share
     if len(asked) < len(missed):  # a missed sample that was not asked goes with the nearest that was
         order = np.searchsorted(asked, never).clip(0, len(asked) - 1)
         reachable[never] = known[asked[order]]

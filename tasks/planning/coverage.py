@@ -1,5 +1,5 @@
-"""What the planned photos will see of a surface: rays from the planned poses, and from where the vehicle may be
-instead when its position errs."""
+"""What the planned photos will see of a surface: rays from the planned poses, and from where the vehicle may
+be instead when its position errs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What is seen when positions err: of each draw the share of the samples, and of each sample its pixel."""
+    """What is seen when positions err: of each draw a share of the samples, of each sample its pixel."""
 
     once: Array  # (D,) share of the samples in at least one photo at the asked GSD and angle
     twice: Array  # (D,) in at least two
@@ -111,8 +111,8 @@ def seen_well(
         table.eyes_m, table.R_world_camera, table.first, table.samples, table.visible[0],
         samples.points_m, np.asarray(surface.plane.normal), *_optics(camera),
         gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9,
-        np.zeros(count, dtype=np.int64), well, *(np.zeros(count, dtype=np.bool_) for _ in range(3)),
-        np.full(count, np.inf),
+        np.zeros(count, dtype=np.int64), well, np.zeros(count, dtype=np.bool_),
+        np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_), np.full(count, np.inf),
     )  # fmt: skip
     spans = zip(table.first, table.first[1:], strict=False)
     return [table.samples[a:b][well[a:b]] for a, b in spans], samples

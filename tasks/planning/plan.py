@@ -65,8 +65,8 @@ def plan_and_prove(
     on_progress: Callable[[float], None] = lambda fraction: None,
 ) -> tuple[FlightPlan, tuple[WidthMap, ...]]:
     """Plan the inspection's flights, and prove what they will see: for each surface, in the plan's order, the
-    smallest crack width that can be measured at each place. points_m: (N, 3) float64, the structure's occupied
-    points.
+    smallest crack width that can be measured at each place. points_m: (N, 3) float64, the structure's
+    occupied points.
 
     The vehicle keeps radius, clearance and position error from every scanned point, and radius and position
     error from air that nobody has seen to be free (`allowed`), from the fence and from no-fly boxes.
@@ -202,8 +202,8 @@ def flights_within_reach(
                 usable = vehicle.endurance_s * (1 - vehicle.reserve)
                 raise BadInput(
                     "vehicle.endurance_s",
-                    f"a battery lasts {usable:.0f} s when its reserve of {vehicle.reserve:.0%} is kept, and the"
-                    f" nearest shooting point and back takes {problem.seconds:.0f} s",
+                    f"a battery lasts {usable:.0f} s when its reserve of {vehicle.reserve:.0%} is kept, and"
+                    f" the nearest shooting point and back takes {problem.seconds:.0f} s",
                     "Give a home_m nearer to the surfaces, a lower reserve or a vehicle that flies longer.",
                 ) from None
             del stops[problem.number]

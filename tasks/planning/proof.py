@@ -29,9 +29,7 @@ class WidthMap:
 
     surface: str
     cell_m: float
-    width_mm: npt.NDArray[
-        np.float32
-    ]  # (H, W) smallest measurable width, NaN off the surface and where unseen
+    width_mm: npt.NDArray[np.float32]  # (H, W) smallest measurable, NaN off the surface and where unseen
 
 
 @dataclass(frozen=True)

@@ -73,9 +73,9 @@ def left_out(coverage: Sequence[SurfaceCoverage]) -> tuple[LeftOut, ...]:
         LeftOut(
             item=c.surface,
             stage="planning",
-            what=f"with this position error, one flight of twenty shows less than {c.twice_p05:.0%} of what can"
-            " be reached in two photos",
-            remedy="Raise plan.overlap, position more exactly (RTK), or look at the coverage after the flight.",
+            what=f"with this position error, one flight of twenty shows less than {c.twice_p05:.0%} of what"
+            " can be reached in two photos",
+            remedy="Raise plan.overlap, or position more exactly (RTK).",
         )
         for c in coverage
         if c.covered >= SHORT and c.twice_p05 is not None and c.twice_p05 < SHORT_TWICE

@@ -69,9 +69,9 @@ def planned_stand_off_m(gsd_mm_px: float, camera: Camera, vehicle: Vehicle) -> f
         longer = np.ceil(needed * 1000 / gsd_mm_px)
         raise BadInput(
             "plan.gsd_mm_px",
-            f"{gsd_mm_px:g} mm/px takes this camera at most {farthest:.2f} m from the surface, so it is planned"
-            f" {max(stand_off, 0.0):.2f} m away and may come {error:.2f} m closer (position error), but the"
-            f" vehicle must stay {vehicle.radius_m + vehicle.clearance_m:.2f} m away (radius"
+            f"{gsd_mm_px:g} mm/px takes this camera at most {farthest:.2f} m from the surface, so it is"
+            f" planned {max(stand_off, 0.0):.2f} m away and may come {error:.2f} m closer (position error), but"
+            f" the vehicle must stay {vehicle.radius_m + vehicle.clearance_m:.2f} m away (radius"
             f" {vehicle.radius_m:g}, clearance {vehicle.clearance_m:g})",
             f"Ask for {safe:g} mm/px or coarser, take a lens of at least {longer:.0f} px focal length, or"
             " lower vehicle.clearance_m or the position error (RTK).",

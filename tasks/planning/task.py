@@ -34,8 +34,8 @@ def pages(inputs: Mapping[str, Any], made: FlightPlan) -> list[Page]:
         "|---|---|---|---|---|---|---|---|---|---|---|",
         *(
             f"| {c.surface} | {c.area_m2:.2f} | {c.covered:.1%} | {c.reachable:.1%} | {c.twice or 0:.1%}"
-            f" | {c.twice_p05 or 0:.1%} | {c.measurable_mm or 0:.2f} | {c.stand_off_m:.2f} | {c.gsd_mm_px:.2f}"
-            f" | {c.photos} | {'; '.join(c.not_reached)} |"
+            f" | {c.twice_p05 or 0:.1%} | {c.measurable_mm or 0:.2f} | {c.stand_off_m:.2f}"
+            f" | {c.gsd_mm_px:.2f} | {c.photos} | {'; '.join(c.not_reached)} |"
             for c in made.coverage
         ),
         "",

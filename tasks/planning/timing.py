@@ -54,8 +54,8 @@ def landing_s(height_m: float) -> float:
 def shot_times_s(
     home_m: Vector3, waypoints: Sequence[Waypoint], vehicle: Vehicle, camera: Camera
 ) -> tuple[Array, float]:
-    """When each photo of a flight is taken, seconds since take-off, and when the last waypoint is left: a full
-    stop at every waypoint."""
+    """When each photo of a flight is taken, seconds since take-off, and when the last waypoint is left: a
+    full stop at every waypoint."""
     seconds, on_the_way = 0.0, 0.0
     here, yaw = np.asarray(home_m), waypoints[0].yaw_deg if waypoints else 0.0
     times: list[float] = []

@@ -1,4 +1,4 @@
-"""Which samples of a surface each photo can show, found once and used for every draw of the position error."""
+"""Which samples of a surface each photo can show, found once and used for every draw of the position."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,10 +42,8 @@ def view_table(
 ) -> ViewTable:
     """points_m: (N, 3) samples of the surface. sigma_m: of the position error along an axis; 0 for none."""
     tree = cKDTree(points_m)
-    corners = np.array(
-        [(-0.5, -0.5), (camera.width_px - 0.5, -0.5), (-0.5, camera.height_px - 0.5)]
-        + [(camera.width_px - 0.5, camera.height_px - 0.5)]
-    )
+    right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
+    corners = np.array([(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)])
     level = CameraPose(position_m=(0.0, 0.0, 0.0), yaw_deg=0.0, pitch_deg=0.0)
     corner_rays = camera.back_project(corners, level) @ level.R_world_camera  # in the camera's own frame
     found = [_near(tree, surface, pose, corner_rays, 4.0 * sigma_m) for pose in poses]
