@@ -56,7 +56,7 @@ def aligned(
 
 
 def ties(sites: Sequence[Site], edges: Sequence[Edge], settings: RegistrationSettings) -> list[Tie]:
-    """The edges whose stations overlap by the paper's τ as much as is asked; each fine cloud is taken once."""
+    """The edges whose stations overlap by τ as much as is asked; each fine cloud is taken once."""
     near: dict[tuple[int, int], float] = {}  # share of the first station's points near one of the second
     for station, site in enumerate(sites):
         touching = [e for e in edges if station in (e.source, e.target)]
