@@ -1,10 +1,12 @@
 """Bundle adjustment of plane-induced cameras: what makes a mosaic metric.
 
-Unknown: six numbers a photo (rotation, position), a focal length and k1 per camera, the positions' common
-error, two coordinates per track on the plane. Residuals are pixels of the photos as taken, through the full
-Brown model, so nothing is gained by shrinking the mosaic: what is left free is a similarity, which the
-priors hold. Levenberg-Marquardt with Cauchy weights; tracks are eliminated (Schur complement, Triggs et al.
-2000, section 6), photos remain as a banded system."""
+Unknown: eight numbers a photo (rotation, position, rolling shutter), a focal length and k1 per camera, the
+positions' common error, two coordinates per track on the plane. Residuals are pixels of the photos as taken,
+through the full Brown model, so nothing is gained by shrinking the mosaic: what is left free is a similarity,
+which the priors hold. How much a rolling shutter may do is learnt from all photos together: free to do
+anything in each, it would make them free homographies, which are not metric. Levenberg-Marquardt with Cauchy
+weights; tracks are eliminated (Schur complement, Triggs et al. 2000, section 6), photos remain as a banded
+system."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -26,6 +28,7 @@ from tasks.stitching.bundle import (
 from tasks.stitching.normal_equations import damped_step
 from tasks.stitching.prior import Prior
 from tasks.stitching.tracks import Observations
+from tasks.stitching.uncertainty import Certainty, certainty_of, learnt_roll
 from tasks.stitching.view import Array, View
 
 # Each round adjusts, then drops outliers. Residuals are taken for at least this uncertain (px): wide weights
@@ -36,6 +39,7 @@ CONVERGED = 1e-4  # relative fall of the cost
 ALIKE = 25.0  # so many points of a photo err alike (relief, shutter, lens): they count as one
 CAUCHY = 2.5  # residuals of this many sigma count half
 OUTLIER = 5.0  # and those of this many are dropped at the end
+LARGEST_ROLL = 0.004  # of the photo's height: 1σ of a rolling shutter's effect before any was seen
 FAR = 3.0  # positions off by so many sigma count half: some photo bears another's
 
 
@@ -46,6 +50,7 @@ class Adjusted:
     residual_px: Array  # (M, 2)
     sigma_px: float  # of one coordinate, robust
     bias: Array  # (3,) common error of the prior positions
+    certainty: Certainty  # of the photos that `observations` see, in their order
 
 
 def adjust(
@@ -66,24 +71,30 @@ def adjust(
     state = State(
         R=np.stack([v.R for v in own]),
         C=np.stack([v.C for v in own]),
+        roll=np.zeros((len(own), 2)),
         log_focal=np.zeros(len(cameras)),
         k1=np.array([c.k1 for c in cameras]),
         bias=np.zeros(3),
         X=np.zeros((0, 2)),
     )
     sigma, residual = 0.0, np.zeros((0, 2))
+    sigma_roll = np.full(2, LARGEST_ROLL * max(c.height_px for c in cameras))
     for round_, least_sigma in enumerate(LEAST_SIGMA_PX):
-        bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, [focal_sigmas[i] for i in seen])
+        sigmas = [focal_sigmas[i] for i in seen]
+        bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll)
         state = replace(state, X=points(state, bundle))
         state, residual, sigma = _iterate(state, bundle, least_sigma)
         on_progress((round_ + 1) / len(LEAST_SIGMA_PX))
         good = np.linalg.norm(residual, axis=1) < OUTLIER * sigma
         if round_ < len(LEAST_SIGMA_PX) - 1:
             current = current.where(good)
+            sigma_roll = learnt_roll(state, bundle, _weight(residual, sigma), _trust(state, bundle))
     adjusted = list(views)
     for k, i in enumerate(seen):
         adjusted[i] = bundle.view(state, k)
-    return Adjusted(tuple(adjusted), replace(current, photo=seen[current.photo]), residual, sigma, state.bias)
+    certainty = certainty_of(state, bundle, residual, _weight(residual, sigma), _trust(state, bundle))
+    kept = replace(current, photo=seen[current.photo])
+    return Adjusted(tuple(adjusted), kept, residual, sigma, state.bias, certainty)
 
 
 def _iterate(state: State, bundle: Bundle, least_sigma: float) -> tuple[State, Array, float]:
@@ -94,8 +105,7 @@ def _iterate(state: State, bundle: Bundle, least_sigma: float) -> tuple[State, A
         sigma = max(_sigma(residual), least_sigma)
         cost = _cost(state, bundle, residual, sigma)
         while True:
-            weight = 1.0 / (1.0 + _squares(residual, sigma)) / sigma**2 / ALIKE
-            trust = 1.0 / (1.0 + _far(state, bundle))
+            weight, trust = _weight(residual, sigma), _trust(state, bundle)
             candidate = damped_step(state, bundle, residual, jacobians, weight, trust, damping)
             new_residual = residuals(candidate, bundle)
             new_cost = _cost(candidate, bundle, new_residual, sigma)
@@ -115,6 +125,16 @@ def _sigma(residual: Array) -> float:
     """Of one coordinate, from the median length (Rayleigh: 1.177 σ)."""
     lengths = np.linalg.norm(np.nan_to_num(residual, nan=1e6), axis=1)
     return float(np.median(lengths)) / 1.1774
+
+
+def _weight(residual: Array, sigma: float) -> Array:
+    """(M,) 1/px²."""
+    return np.asarray(1.0 / (1.0 + _squares(residual, sigma)) / sigma**2 / ALIKE)
+
+
+def _trust(state: State, bundle: Bundle) -> Array:
+    """(n,) of the prior positions, 0..1."""
+    return np.asarray(1.0 / (1.0 + _far(state, bundle)))
 
 
 def _squares(residual: Array, sigma: float) -> Array:
@@ -138,6 +158,7 @@ def _cost(state: State, bundle: Bundle, residual: Array, sigma: float) -> float:
         FAR**2 * np.log1p(_far(state, bundle)).sum(),
         (bundle.weight_rotation * turned**2).sum(),
         (bundle.weight_bias * state.bias**2).sum(),
+        ((state.roll / bundle.sigma_roll) ** 2).sum(),
         ((state.log_focal / bundle.sigma_log_focal) ** 2).sum(),
         (((state.k1 - nominal_k1(bundle)) / sigma_k1(bundle)) ** 2).sum(),
     )

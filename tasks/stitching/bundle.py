@@ -3,15 +3,16 @@
 Residuals are pixels of the photos as taken, through the full Brown model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from schemas.camera import Camera
 from tasks.stitching.prior import Prior
 from tasks.stitching.tracks import Index, Observations
-from tasks.stitching.view import FACING, Array, View, rotation, rotation_vector, with_lens
+from tasks.stitching.view import FACING, Array, View, rolled, rotation, rotation_vector, with_lens
 
+PER_PHOTO = 8  # unknowns: rotation, position, rolling shutter
 K1_AT_EDGE = 0.03  # 1σ of what k1 may move the photo's edge by, as a share of its radius
 HELD = 0.01  # 1σ, of its distance and in radians, of the photo that holds a bundle without positions
 
@@ -20,6 +21,7 @@ HELD = 0.01  # 1σ, of its distance and in radians, of the photo that holds a bu
 class State:
     R: Array  # (n, 3, 3)
     C: Array  # (n, 3)
+    roll: Array  # (n, 2) pixels that the rolling shutter moves the last row by against the first
     log_focal: Array  # (cameras,) relative to the nominal
     k1: Array  # (cameras,)
     bias: Array  # (3,)
@@ -33,6 +35,7 @@ class Bundle:
     photo: Index  # (M,)
     track: Index  # (M,)
     xy: Array  # (M, 2) pixels as taken
+    rolled: Array  # (M,) −½..½: instant of the row
     cameras: tuple[Camera, ...]  # distinct ones, nominal
     camera_of: Index  # (n,)
     sigma_log_focal: Array  # (cameras,)
@@ -41,6 +44,7 @@ class Bundle:
     weight_rotation: Array  # (n, 3) 1/σ²; 0: not known
     weight_position: Array  # (n, 3)
     weight_bias: Array  # (3,)
+    sigma_roll: Array  # (2,) px
 
     @property
     def shared(self) -> int:
@@ -50,7 +54,7 @@ class Bundle:
         c = int(self.camera_of[k])
         nominal = self.cameras[c]
         focal = float(nominal.focal_px * np.exp(state.log_focal[c]))
-        return View(with_lens(nominal, focal, float(state.k1[c])), state.R[k], state.C[k])
+        return View(with_lens(nominal, focal, float(state.k1[c])), state.R[k], state.C[k], state.roll[k])
 
 
 def build_bundle(
@@ -60,16 +64,19 @@ def build_bundle(
     priors: Sequence[Prior],
     sigma_bias: Array,
     focal_sigmas: Sequence[float],
+    sigma_roll: Array,
 ) -> Bundle:
     keys = [camera_key(camera) for camera in cameras]
     camera_of = np.array([keys.index(camera_key(v.camera)) for v in views], np.int64)
     xy = observations.xy.copy()
+    when = np.zeros(len(xy))
     for k, view in enumerate(views):
+        mine = observations.photo == k
         if any(view.camera.distortion):
-            mine = observations.photo == k
             principal = np.asarray(view.camera.principal_px)
             ideal = (xy[mine] - principal) / view.camera.focal_px
             xy[mine] = view.camera.distort(ideal) * view.camera.focal_px + principal
+        when[mine] = rolled(xy[mine, 1], view.camera)
     position = np.stack([p.sigma_position for p in priors])
     rotations = np.stack([p.sigma_rotation for p in priors])
     prior_C = np.stack([p.view.C for p in priors])
@@ -83,6 +90,7 @@ def build_bundle(
         photo=observations.photo,
         track=observations.track,
         xy=xy,
+        rolled=when,
         cameras=cameras,
         camera_of=camera_of,
         sigma_log_focal=np.array([focal_sigmas[int(np.argmax(camera_of == c))] for c in range(len(cameras))]),
@@ -91,6 +99,7 @@ def build_bundle(
         weight_rotation=np.where(np.isfinite(rotations), rotations, np.inf) ** -2.0,
         weight_position=np.where(np.isfinite(position), position, np.inf) ** -2.0,
         weight_bias=np.maximum(sigma_bias, 1e-9) ** -2.0,
+        sigma_roll=sigma_roll,
     )
 
 
@@ -112,8 +121,10 @@ def points(state: State, bundle: Bundle) -> Array:
         mine = bundle.photo == k
         view = bundle.view(state, k)
         principal, focal = np.asarray(view.camera.principal_px), view.camera.focal_px
-        ideal = view.camera.undistort((bundle.xy[mine] - principal) / focal)
-        np.add.at(total, bundle.track[mine], np.nan_to_num(view.to_plane(ideal * focal + principal)))
+        still = bundle.xy[mine] - bundle.rolled[mine, None] * state.roll[k]
+        ideal = view.camera.undistort((still - principal) / focal) * focal + principal
+        on_plane = replace(view, roll_px=np.zeros(2)).to_plane(ideal)
+        np.add.at(total, bundle.track[mine], np.nan_to_num(on_plane))
     return np.asarray(total / np.bincount(bundle.track)[:, None])
 
 
@@ -142,18 +153,18 @@ def _ideal(state: State, bundle: Bundle) -> tuple[Array, Array]:
 
 def residuals(state: State, bundle: Bundle) -> Array:
     xy, _ = _ideal(state, bundle)
-    residual = np.empty_like(xy)
+    residual = state.roll[bundle.photo] * bundle.rolled[:, None] - bundle.xy
     of = bundle.camera_of[bundle.photo]
     for c, nominal in enumerate(bundle.cameras):
         mine = of == c
         camera = with_lens(nominal, float(nominal.focal_px * np.exp(state.log_focal[c])), float(state.k1[c]))
-        residual[mine] = camera.distort(xy[mine]) * camera.focal_px + camera.principal_px - bundle.xy[mine]
+        residual[mine] += camera.distort(xy[mine]) * camera.focal_px + camera.principal_px
     return residual
 
 
 @dataclass(frozen=True)
 class Jacobians:
-    pose: Array  # (M, 2, 6) by rotation (in the camera's frame, radians) and position
+    pose: Array  # (M, 2, 8) by rotation (in the camera's frame, radians), position and rolling shutter
     lens: Array  # (M, 2, 2) by log focal and k1
     point: Array  # (M, 2, 2)
 
@@ -190,8 +201,10 @@ def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
     R_transposed = np.swapaxes(state.R[bundle.photo], 1, 2)
     moving = by_camera @ R_transposed
     principal = np.array([cam.principal_px for cam in bundle.cameras])[of]
-    return focal[:, None] * distorted + principal - bundle.xy, Jacobians(
-        pose=np.concatenate([by_camera @ turning, -moving], axis=2),
+    rolling = bundle.rolled[:, None, None] * np.eye(2)
+    residual = focal[:, None] * distorted + principal + state.roll[bundle.photo] * bundle.rolled[:, None]
+    return residual - bundle.xy, Jacobians(
+        pose=np.concatenate([by_camera @ turning, -moving, rolling], axis=2),
         lens=focal[:, None, None] * np.stack([distorted, xy * r2[:, None]], axis=2),
         point=np.ascontiguousarray(moving[:, :, :2]),
     )

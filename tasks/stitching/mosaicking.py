@@ -32,6 +32,7 @@ class Registered:
     canvas: Canvas
     surface: Surface | None  # whose frame the canvas is in
     scale_from: str
+    unit_m: float  # of the adjustment's plane units on the canvas
     pairs: tuple[tuple[int, int], ...]  # neighbours among the photos that are in the mosaic
 
     @property
@@ -69,14 +70,15 @@ def register_photos(
             f"none of its {len(photos)} photos finds a place ({photos[0].name}: {every[0].reason})",
             "Give photos that overlap by a third or more, or their poses",
         )
-    scale_from = frame.scale_from
+    scale_from, unit_m = frame.scale_from, 1.0
     if frame.surface is None and settings.gsd_mm_px is not None:
-        every, scale_from = _to_stated_gsd(every, settings.gsd_mm_px / 1000.0), "stated GSD"
+        unit_m = settings.gsd_mm_px / 1000.0 / _usual_gsd(every)
+        every, scale_from = [_scaled(fate, unit_m) for fate in every], "stated GSD"
     gsd = None if settings.gsd_mm_px is None else settings.gsd_mm_px / 1000.0
     canvas = lay_out(name, [f.view for f in every if f.view is not None], frame.surface, gsd)
     indexed = _reindexed(solved, good)
     among = tuple((good[a], good[b]) for a, b in pairs if every[good[a]].view and every[good[b]].view)
-    return Registered(tuple(photos), tuple(every), indexed, canvas, frame.surface, scale_from, among)
+    return Registered(tuple(photos), tuple(every), indexed, canvas, frame.surface, scale_from, unit_m, among)
 
 
 def blend_photos(
@@ -112,10 +114,12 @@ def _renumbered(source: npt.NDArray[np.uint16], shown: Sequence[int]) -> npt.NDA
     return np.array([0, *(i + 1 for i in shown)], np.uint16)[source]
 
 
-def _to_stated_gsd(every: Sequence[Fate], gsd_m: float) -> list[Fate]:
-    """All views scaled so that a pixel of the median photo covers the stated ground."""
-    scale = gsd_m / float(np.median([f.view.units_per_px for f in every if f.view is not None]))
-    return [f if f.view is None else replace(f, view=f.view.moved(scale, 0.0, np.zeros(2))) for f in every]
+def _usual_gsd(every: Sequence[Fate]) -> float:
+    return float(np.median([f.view.units_per_px for f in every if f.view is not None]))
+
+
+def _scaled(fate: Fate, scale: float) -> Fate:
+    return fate if fate.view is None else replace(fate, view=fate.view.moved(scale, 0.0, np.zeros(2)))
 
 
 def _reindexed(solved: Solved, good: Sequence[int]) -> Solved:
@@ -124,4 +128,5 @@ def _reindexed(solved: Solved, good: Sequence[int]) -> Solved:
         views={good[i]: view for i, view in solved.views.items()},
         matches={good[i]: count for i, count in solved.matches.items()},
         rms_px={good[i]: rms for i, rms in solved.rms_px.items()},
+        covariance={good[i]: two for i, two in solved.covariance.items()},
     )

@@ -10,8 +10,8 @@ from tasks.stitching.view import Array
 
 
 def solve_positive(A: Array, b: Array, shared: int = 0) -> Array:
-    """x of A x = b for a symmetric positive definite (N, N) A, ordered to a narrow band first. The last
-    `shared` unknowns touch all others and stay last.
+    """x of A x = b for a symmetric positive definite (N, N) A and (N,) or (N, K) b, ordered to a narrow band
+    first. The last `shared` unknowns touch all others and stay last.
 
     Raises np.linalg.LinAlgError where A is not positive definite."""
     own = len(b) - shared
@@ -20,17 +20,18 @@ def solve_positive(A: Array, b: Array, shared: int = 0) -> Array:
     permuted = np.ascontiguousarray(A[np.ix_(order, order)])
     filled = permuted != 0
     first = np.argmax(filled, axis=1).astype(np.int64)
-    x = np.empty(len(b))
-    if not _factor_and_solve(permuted, first, b[order].astype(float), x):
+    x = np.ascontiguousarray(b[order].reshape(len(b), -1), dtype=float)
+    if not _factor_and_solve(permuted, first, x):
         raise np.linalg.LinAlgError("matrix is not positive definite")
     result = np.empty_like(x)
     result[order] = x
-    return result
+    return result.reshape(b.shape)
 
 
 @numba.njit(cache=True, nogil=True)
-def _factor_and_solve(A: Array, first: Array, b: Array, x: Array) -> bool:
-    n = len(b)
+def _factor_and_solve(A: Array, first: Array, x: Array) -> bool:
+    """x: (N, K) the right sides, then the solutions, in place."""
+    n = len(x)
     for i in range(n):
         for j in range(first[i], i + 1):
             total = A[i, j]
@@ -43,12 +44,13 @@ def _factor_and_solve(A: Array, first: Array, b: Array, x: Array) -> bool:
             else:
                 A[i, i] = np.sqrt(total)
     for i in range(n):
-        total = b[i]
         for k in range(first[i], i):
-            total -= A[i, k] * x[k]
-        x[i] = total / A[i, i]
+            if A[i, k] != 0.0:
+                x[i] -= A[i, k] * x[k]
+        x[i] /= A[i, i]
     for i in range(n - 1, -1, -1):
         x[i] /= A[i, i]
         for k in range(first[i], i):
-            x[k] -= A[i, k] * x[i]
+            if A[i, k] != 0.0:
+                x[k] -= A[i, k] * x[i]
     return True

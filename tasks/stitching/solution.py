@@ -11,7 +11,7 @@ from tasks.stitching.candidates import candidate_pairs
 from tasks.stitching.pairs import PhotoFeatures, match_pairs
 from tasks.stitching.prior import PlaneFrame
 from tasks.stitching.tracks import Observations, build_tracks
-from tasks.stitching.view import View
+from tasks.stitching.view import Array, View
 
 LEAST_OBSERVATIONS = 12  # a photo with fewer points left is not held by them
 LEAST_KEPT = 0.4  # nor one most of whose points the adjustment threw out
@@ -25,6 +25,8 @@ class Solved:
     views: dict[int, View]  # photos held by their matches
     matches: dict[int, int]  # points that hold each
     rms_px: dict[int, float]  # of their residuals, in pixels of the photo
+    covariance: dict[int, Array]  # (2, 2), plane units², of where each photo's middle lies among the others
+    sigma_scale: float  # of the whole, relative
     sigma_px: float
     false_edges: int
 
@@ -59,7 +61,7 @@ def solve(
         if not loose:
             return _solved(adjusted, matched - len(edges))
         edges = [e for e in edges if e.a not in loose and e.b not in loose]
-    return Solved({}, {}, {}, 0.0, matched)
+    return Solved({}, {}, {}, {}, 0.0, 0.0, matched)
 
 
 def neighbours(features: Sequence[PhotoFeatures], frame: PlaneFrame) -> list[tuple[int, int]]:
@@ -106,6 +108,8 @@ def _solved(adjusted: Adjusted, false_edges: int) -> Solved:
         views={int(i): adjusted.views[i] for i in seen},
         matches={int(i): int(count[i]) for i in seen},
         rms_px={int(i): float(np.sqrt(squares[i] / count[i])) for i in seen},
+        covariance=dict(zip((int(i) for i in seen), adjusted.certainty.relative, strict=True)),
+        sigma_scale=adjusted.certainty.scale,
         sigma_px=adjusted.sigma_px,
         false_edges=false_edges,
     )

@@ -11,7 +11,7 @@ from artifacts import store
 from artifacts.mosaic import MosaicWriter
 from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of, thumbnail
-from schemas.contract import Matrix3
+from schemas.contract import Matrix3, Vector2
 from schemas.mosaic import Mosaic, PhotoPlacement
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput, LeftOut
@@ -150,8 +150,17 @@ def _placement(registered: "Registered", index: int, gain: float) -> PhotoPlacem
         H_mosaic_photo=H,
         matches=solved.matches.get(index, 0),
         rms_px=solved.rms_px.get(index),
+        covariance_mm2=_covariance_mm2(registered, index),
         gain=gain,
     )
+
+
+def _covariance_mm2(registered: "Registered", index: int) -> tuple[Vector2, Vector2] | None:
+    """None where no scale is known, or no match holds the photo."""
+    if registered.scale_from == "none" or index not in registered.solved.covariance:
+        return None
+    (a, b), (c, d) = registered.solved.covariance[index] * registered.unit_m**2 * 1e6
+    return (float(a), float(b)), (float(c), float(d))
 
 
 def _matrix(H: "Array") -> Matrix3:

@@ -3,7 +3,7 @@
 Plane frame: u right, v up, w towards the viewer; the surface is w = 0. Metres where a scale is known, else
 the units of the first guess. Poses are camera-to-plane, as CameraPose gives them for the world."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,11 +21,23 @@ class View:
     camera: Camera
     R: Array  # (3, 3) R_plane_camera: columns are the camera's axes in the plane frame
     C: Array  # (3,) position in the plane frame, C[2] > 0
+    roll_px: Array = field(default_factory=lambda: np.zeros(2))  # (2,) rolling shutter: see `rolled`
 
     @property
     def H_plane_photo(self) -> Array:
         """(3, 3): undistorted photo pixels to (u, v); the third coordinate is negative where the ray meets
-        the plane in front of the camera."""
+        the plane in front of the camera. The rolling shutter is undone in it, as if the lens had no
+        distortion: what the two have to do with each other is far below a pixel."""
+        height, (a, b) = self.camera.height_px, self.roll_px
+        middle = (height - 1) / 2
+        still = np.array(
+            [[1, -a / height, a / height * middle], [0, 1 - b / height, b / height * middle], [0, 0, 1]]
+        )
+        return np.asarray(self._H_plane_ideal @ still)
+
+    @property
+    def _H_plane_ideal(self) -> Array:
+        """(3, 3): pixels without distortion and rolling shutter to (u, v)."""
         u, v, w = self.C
         rays = self.R @ np.linalg.inv(self.camera.K)
         return np.stack([u * rays[2] - w * rays[0], v * rays[2] - w * rays[1], rays[2]])
@@ -39,13 +51,19 @@ class View:
 
     def to_undistorted(self, uv: npt.ArrayLike) -> Array:
         """(N, 2) undistorted pixels of (N, 2) plane points; NaN behind the camera."""
-        return np.asarray(self._ideal(uv) * self.camera.focal_px + self.camera.principal_px)
+        return self._rolled(self._ideal(uv) * self.camera.focal_px + self.camera.principal_px)
 
     def to_photo(self, uv: npt.ArrayLike) -> Array:
-        """(N, 2) pixels of the photo as taken, distortion included."""
-        return np.asarray(
+        """(N, 2) pixels of the photo as taken, distortion and rolling shutter included."""
+        return self._rolled(
             self.camera.distort(self._ideal(uv)) * self.camera.focal_px + self.camera.principal_px
         )
+
+    def _rolled(self, px: Array) -> Array:
+        """(N, 2) pixels where a row lies roll_px · rolled(row) farther on than a global shutter shows it."""
+        a, b = self.roll_px
+        y = (px[:, 1] + b * rolled(0.0, self.camera)) / (1 - b / self.camera.height_px)
+        return np.column_stack([px[:, 0] + a * rolled(y, self.camera), y])
 
     def _ideal(self, uv: npt.ArrayLike) -> Array:
         in_camera = self._in_camera(np.asarray(uv, dtype=float))
@@ -87,6 +105,11 @@ class View:
         return replace(self, R=turn @ self.R, C=scale * (turn @ self.C) + np.array([shift[0], shift[1], 0.0]))
 
 
+def rolled(row_px: npt.ArrayLike, camera: Camera) -> Array:
+    """−½..½: when a row is exposed, as a share of the readout, the middle one at 0."""
+    return np.asarray((np.asarray(row_px, dtype=float) + 0.5) / camera.height_px - 0.5)
+
+
 def with_lens(camera: Camera, focal_px: float, k1: float) -> Camera:
     """Not model_copy: it would carry over the cached matrix."""
     return Camera.model_validate(camera.model_dump() | {"focal_px": focal_px, "k1": k1})
@@ -107,7 +130,8 @@ def shrunk(view: View, factor: int) -> View:
         "cx_px": (cx + 0.5) * sx - 0.5,
         "cy_px": (cy + 0.5) * sy - 0.5,
     }
-    return replace(view, camera=Camera.model_validate(camera.model_dump() | values))
+    smaller = Camera.model_validate(camera.model_dump() | values)
+    return replace(view, camera=smaller, roll_px=view.roll_px * [sx, sy])
 
 
 def rotation(vector: Array) -> Array:

@@ -92,10 +92,11 @@ def test_derivatives_of_the_bundle() -> None:
     xy = rng.uniform(50, 550, (40, 2))
     priors = [Prior(v, np.full(3, 0.1), np.full(3, 0.05)) for v in views]
     seen = Observations(photo[order], track[order], xy)
-    bundle = build_bundle(views, (CAMERA,), seen, priors, np.full(3, 0.1), [0.01, 0.01])
+    bundle = build_bundle(views, (CAMERA,), seen, priors, np.full(3, 0.1), [0.01, 0.01], np.full(2, 5.0))
     state = State(
         R=np.stack([v.R for v in views]),
         C=np.stack([v.C for v in views]),
+        roll=np.array([[2.0, -1.0], [0.5, 3.0]]),
         log_focal=np.array([0.01]),
         k1=np.array([-0.05]),
         bias=np.zeros(3),
@@ -112,6 +113,10 @@ def test_derivatives_of_the_bundle() -> None:
         moved = replace(state, C=state.C + turn)
         for changed, analytic in ((turned, jacobians.pose[:, :, k]), (moved, jacobians.pose[:, :, 3 + k])):
             np.testing.assert_allclose((residuals(changed, bundle) - start) / step, analytic, atol=2e-2)
+    for k in range(2):
+        rolling = replace(state, roll=state.roll + step * np.eye(2)[k])
+        numeric = (residuals(rolling, bundle) - start) / step
+        np.testing.assert_allclose(numeric, jacobians.pose[:, :, 6 + k], atol=2e-2)
     longer = replace(state, log_focal=state.log_focal + step)
     bent = replace(state, k1=state.k1 + step)
     for changed, analytic in ((longer, jacobians.lens[:, :, 0]), (bent, jacobians.lens[:, :, 1])):
@@ -120,6 +125,22 @@ def test_derivatives_of_the_bundle() -> None:
         shifted = replace(state, X=state.X + step * np.eye(2)[k])
         numeric = (residuals(shifted, bundle) - start) / step
         np.testing.assert_allclose(numeric, jacobians.point[:, :, k], atol=2e-2)
+
+
+def test_a_rolling_shutter_moves_rows_in_proportion() -> None:
+    rolling = replace(view(0.1, 0.05, 0.2), roll_px=np.array([3.0, -2.0]))
+    still = replace(rolling, roll_px=np.zeros(2))
+    uv = rolling.to_plane([[10.0, 20.0], [400.0, 300.0], [700.0, 580.0]])
+    moved, ideal = rolling.to_photo(uv), still.to_photo(uv)
+    share = (moved[:, 1] + 0.5) / 600 - 0.5
+    np.testing.assert_allclose(moved - ideal, share[:, None] * [3.0, -2.0], atol=1e-9)
+
+
+def test_the_homography_undoes_the_rolling_shutter() -> None:
+    plain = Camera(width_px=800, height_px=600, focal_px=1000.0)
+    rolling = replace(view(0.1, 0.05, 0.2), camera=plain, roll_px=np.array([3.0, -2.0]))
+    px = np.array([[10.0, 20.0], [400.0, 300.0], [700.0, 580.0]])
+    np.testing.assert_allclose(rolling.to_photo(rolling.to_plane(px)), px, atol=1e-9)
 
 
 def test_a_canvas_that_explodes_is_refused() -> None:
