@@ -11,7 +11,7 @@ from schemas.vehicle import Vehicle
 from tasks.simulation import arch, bridge, facade, wall
 from tasks.simulation.scene import Scene
 
-BRIDGE_SURFACES = ("wall-south-08", "soffit-02", "wall-east-01")
+BRIDGE_SURFACES = ("wall-south-06", "soffit-02", "wall-east-01")
 SCENES: dict[str, Callable[[int], Scene]] = {
     "bridge": bridge.bridge,
     "wall": wall.wall,

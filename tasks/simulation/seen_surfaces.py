@@ -112,7 +112,7 @@ def _pieces(faces: Sequence[Face], sight: "_Sight", narrowest_m: float) -> list[
     found = []
     for label in range(1, count + 1):
         own = labels == label
-        most = np.bincount(owner.reshape(rows, columns)[own]).argmax()
+        most = int(np.bincount(owner.reshape(rows, columns)[own]).argmax())
         boxes = [
             shapely.box(
                 *(corner + (c, r) * np.array(PIXEL_M)), *(corner + np.array((c + 1, r + 1)) * PIXEL_M)

@@ -22,6 +22,7 @@ from tasks.surfaces.obstacles import obstacles, on_surfaces
 from tasks.surfaces.outliers import sparse_outliers
 from tasks.surfaces.patches import Patch, patches
 from tasks.surfaces.ransac import find_planes
+from tasks.surfaces.structure import of_structure
 from tasks.surfaces.terrain import Terrain, find_terrain
 from tasks.surfaces.voxels import thin, voxelise
 
@@ -68,7 +69,8 @@ def extract_structure(
             "Lower surfaces.min_area_m2, raise surfaces.distance_m for a noisy scanner, "
             "or check the unit of the scans",
         )
-    surfaces = name_surfaces([patch.surface for patch in found], ground)
+    built = of_structure(found, ground, cloud.points, settings.epsilon_m)
+    surfaces = name_surfaces([patch.surface for patch in found], ground, built, settings.min_area_m2)
 
     left = np.ones(len(cloud), dtype=bool)
     left[np.concatenate([patch.points for patch in found])] = False

@@ -1,5 +1,7 @@
 """Cylinders, cut into strips; what only looks like one."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -68,7 +70,7 @@ def test_a_round_pier_is_cut_from_north_on() -> None:
 
 def test_an_eight_sided_column_keeps_its_sides() -> None:
     corners = np.array([(np.cos(t), np.sin(t)) for t in np.radians(45 * np.arange(9))]) * 0.5
-    sides = [np.linspace(a, b, 1500, endpoint=False) for a, b in zip(corners, corners[1:], strict=False)]
+    sides = [np.linspace(a, b, 1500, endpoint=False) for a, b in pairwise(corners)]
     cloud = curve(*np.concatenate(sides).T, 3.0, 0)
     assert len(cut(cloud)) == 8
     assert np.diff(facings_deg(cut(cloud))) == pytest.approx(np.full(7, 45.0), abs=1.0)
