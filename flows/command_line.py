@@ -125,6 +125,7 @@ def main() -> None:
     import flows.evaluate_command  # each adds its commands to the app
     import flows.flight_commands
     import flows.photo_commands
+    import flows.plan_command
     import flows.structure_commands  # noqa: F401
 
     try:

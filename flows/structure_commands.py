@@ -1,16 +1,12 @@
-"""`hairline register`, `surfaces` and `plan`: from scans to a flight plan, on plain files."""
+"""`hairline register` and `surfaces`: from scans to surfaces and obstacles, on plain files."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from flows.command_line import app
-from flows.console import err
 from flows.plain_files import (
-    Many,
     OutFolder,
     one_by_one,
-    read_camera,
-    read_contract,
     say,
     warn,
     working,
@@ -18,6 +14,7 @@ from flows.plain_files import (
 from schemas.problem import BadInput
 
 if TYPE_CHECKING:
+    from schemas.registered_model import RegisteredModel
     from schemas.scan import Scan
 
 
@@ -84,7 +81,8 @@ def surfaces(
     Parameters
     ----------
     cloud:
-        The model.ply of `hairline register`, or any scan file.
+        The model.ply of `hairline register`, its poses.json beside it, or any scan file. Where the scanners
+        stood says which air they saw to be free, which a flight plan asks.
     out:
         Folder to write to.
     unit:
@@ -103,7 +101,9 @@ def surfaces(
     from tasks.surfaces.task import extract
 
     with working(out):
-        model = register_scans.bare(ingested_scan(cloud, METRES[unit]), RegistrationSettings())
+        model = registered_beside(cloud) or register_scans.bare(
+            ingested_scan(cloud, METRES[unit]), RegistrationSettings()
+        )
         settings = SurfaceSettings(min_area_m2=min_area_m2, distance_m=distance_m, epsilon_m=epsilon_m)
         structure = extract.bare(model, settings)
         write_structure(out, structure, copy=True)
@@ -111,78 +111,22 @@ def surfaces(
     warn(structure.left_out)
 
 
-@app.command
-def plan(
-    surfaces: Path,
-    *,
-    camera: Path,
-    out: OutFolder,
-    gsd_mm_px: float | None = None,
-    smallest_crack_mm: float = 0.3,
-    overlap: float = 0.6,
-    inspect: Annotated[tuple[str, ...], Many] = (),
-    clearance_m: float = 1.0,
-    radius_m: float = 0.4,
-    home_m: tuple[float, float, float] | None = None,
-    origin: tuple[float, float, float] | None = None,
-) -> None:
-    """Plan a collision-free flight: D/plan.json, D/mission.waypoints, D/mission.plan.
+def registered_beside(cloud: Path) -> "RegisteredModel | None":
+    """The registered model that wrote this cloud, by the poses.json beside it; None where there is none."""
+    import json
 
-    Parameters
-    ----------
-    surfaces:
-        The surfaces.json of `hairline surfaces`, its occupied.ply beside it.
-    camera:
-        YAML with width_px, height_px, and focal_px (or focal_mm and sensor_width_mm).
-    out:
-        Folder to write to.
-    gsd_mm_px:
-        Ground sample distance, mm per pixel. Default: the smallest crack's width.
-    smallest_crack_mm:
-        Smallest crack to detect, mm.
-    overlap:
-        Of neighbouring photos, 0.1 to 0.95, widened for the position error.
-    inspect:
-        Names of the surfaces to inspect. Default: all but the ground.
-    clearance_m:
-        Least distance between vehicle and anything else, metres.
-    radius_m:
-        Half the vehicle's largest diagonal, propellers included, metres.
-    home_m:
-        Take-off and landing place, east north up, metres. Default: a free place beside the structure.
-    origin:
-        Latitude, longitude (degrees) and altitude (metres) of the world's origin (WGS84).
-    """
-    from flows.collect_images import REHEARSAL_ORIGIN
-    from flows.results import write_flight_plan
-    from schemas.geodesy import GeoOrigin
-    from schemas.settings import PlanSettings
-    from schemas.structure import Structure
-    from schemas.vehicle import Vehicle
-    from tasks.planning.task import plan_flight
+    from artifacts import store
+    from schemas.registered_model import RegisteredModel
 
-    structure = read_contract(surfaces, Structure)
-    vehicle = Vehicle(clearance_m=clearance_m, radius_m=radius_m)
-    lens = read_camera(camera)
-    where = (
-        GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
-        if origin
-        else REHEARSAL_ORIGIN
-    )
-    settings = PlanSettings(
-        gsd_mm_px=gsd_mm_px, smallest_crack_mm=smallest_crack_mm, overlap=overlap, surfaces=inspect or None
-    )
-    with working(out):
-        enter_beside(surfaces, "occupied.ply", structure.occupied.sha256)
-        planned = plan_flight.bare(structure, lens, vehicle, where, home_m, settings)
-        write_flight_plan(out, planned)
-    photos, minutes = len(planned.shooting_points), planned.duration_s / 60
-    say(f"{photos} photos, {planned.length_m:.0f} m, {minutes:.1f} min: {out / 'plan.json'}")
-    warn(planned.left_out)
-    if origin is None:
-        err.print(
-            "[yellow]Warning: no --origin: the mission lies at ArduPilot's simulator, not at yours[/yellow]"
-        )
+    poses = cloud.with_name("poses.json")
+    if cloud.name != "model.ply" or not (cloud.is_file() and poses.is_file()):
+        return None
+    try:
+        content = json.loads(poses.read_text(encoding="utf-8"))
+        known = {key: value for key, value in content.items() if key in RegisteredModel.model_fields}
+        return RegisteredModel.model_validate(known | {"cloud": store.current().put(cloud)})
+    except (ValueError, AttributeError):
+        raise BadInput(str(poses), "is no poses.json of `hairline register`", "Register again") from None
 
 
 def enter_beside(json_path: Path, name: str, sha256: str) -> None:

@@ -49,6 +49,9 @@ class Camera(Contract):
     k3: float = 0.0
     shutter_s: float = Field(default=1 / 1000, gt=0)  # exposure time, bounds the speed by motion blur
     max_rate_hz: float = Field(default=1.0, gt=0)  # photos a second that it can store
+    f_number: float | None = Field(default=None, gt=0)  # aperture, with pixel_um: what is in focus
+    pixel_um: float | None = Field(default=None, gt=0)  # side of a pixel on the sensor
+    autofocus: bool = True  # False: focused once, at the planned stand-off
 
     @classmethod
     def from_lens(cls, width_px: int, height_px: int, focal_mm: float, sensor_width_mm: float) -> "Camera":
@@ -77,6 +80,13 @@ class Camera(Contract):
     def stand_off_m(self, gsd_mm_px: float) -> float:
         """The distance at which a pixel covers `gsd_mm_px`."""
         return gsd_mm_px * self.focal_px / 1000.0
+
+    def depth_of_field_m(self, distance_m: float) -> float | None:
+        """How far before or behind a focused distance a point blurs over one pixel; None where the aperture
+        is not stated. s²·N·c / f², the circle of confusion c being one pixel."""
+        if self.f_number is None or self.pixel_um is None:
+            return None
+        return distance_m**2 * self.f_number / (self.focal_px**2 * self.pixel_um * 1e-6)
 
     def footprint_m(self, distance_m: float) -> tuple[float, float]:
         """Width and height of what a photo covers of a perpendicular surface."""

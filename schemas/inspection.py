@@ -39,6 +39,9 @@ class CameraInput(Contract):
     k3: float = 0.0
     shutter_s: float = Field(default=1 / 1000, gt=0)
     max_rate_hz: float = Field(default=1.0, gt=0)
+    f_number: float | None = Field(default=None, gt=0)
+    pixel_um: float | None = Field(default=None, gt=0)  # None: from sensor_width_mm, where given
+    autofocus: bool = True
 
     @model_validator(mode="after")
     def _one_focal_length(self) -> Self:
@@ -50,6 +53,8 @@ class CameraInput(Contract):
     def camera(self) -> Camera:
         focal_px = self.focal_px or (self.focal_mm or 0.0) / (self.sensor_width_mm or 1.0) * self.width_px
         known = self.model_dump(exclude={"focal_px", "focal_mm", "sensor_width_mm"})
+        if self.pixel_um is None and self.sensor_width_mm is not None:
+            known["pixel_um"] = self.sensor_width_mm / self.width_px * 1000.0
         return Camera(focal_px=focal_px, **known)
 
 

@@ -34,10 +34,10 @@ def test_ci_runs_the_readmes_test_command() -> None:
 @pytest.mark.parametrize("words", commands("hairline"), ids=" ".join)
 def test_each_hairline_line_is_understood(words: list[str]) -> None:
     """Its command and its options exist; paths are the user's own."""
-    from flows import evaluate_command, flight_commands, photo_commands, structure_commands
+    from flows import evaluate_command, flight_commands, photo_commands, plan_command, structure_commands
     from flows.command_line import app
 
-    assert evaluate_command and flight_commands and photo_commands and structure_commands
+    assert evaluate_command and flight_commands and photo_commands and plan_command and structure_commands
     _command, bound, unused, _ = app.parse_known_args(words[1:])
     assert bound is not None
     assert not unused

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from schemas.camera import Camera
 from schemas.contract import Vector3
+from schemas.crack import Crack
 from schemas.flight_plan import Flight, FlightPlan, Waypoint
 from schemas.geodesy import GeoOrigin
 from schemas.problem import BadInput
@@ -17,6 +18,7 @@ from schemas.surface import Surface
 from schemas.vehicle import Vehicle
 from tasks.planning.airspace import Airspace
 from tasks.planning.allowed import allowed_region
+from tasks.planning.close_ups import close_ups
 from tasks.planning.completing import complete
 from tasks.planning.coverage import samples_of
 from tasks.planning.flights import TooFar, flights, waypoints_along
@@ -63,6 +65,7 @@ def plan_and_prove(
     home_m: Vector3 | None,
     settings: PlanSettings,
     on_progress: Callable[[float], None] = lambda fraction: None,
+    cracks: Sequence[Crack] = (),
 ) -> tuple[FlightPlan, tuple[WidthMap, ...]]:
     """Plan the inspection's flights, and prove what they will see: for each surface, in the plan's order, the
     smallest crack width that can be measured at each place. points_m: (N, 3) float64, the structure's
@@ -71,10 +74,15 @@ def plan_and_prove(
     The vehicle keeps radius, clearance and position error from every scanned point, and radius and position
     error from air that nobody has seen to be free (`allowed`), from the fence and from no-fly boxes.
 
+    cracks: of an earlier pass; the flights then show strips along these, in place of whole surfaces.
+
     Raises BadInput where nothing can be flown, with what would make it possible; a surface that cannot be
     photographed while others can is left out and listed.
     """
-    surfaces = chosen_surfaces(structure, settings.surfaces)
+    if cracks:
+        surfaces = close_ups(structure.surfaces, cracks)
+    else:
+        surfaces = chosen_surfaces(structure, settings.surfaces)
     gsd = settings.asked_gsd_mm_px
     check_camera(camera)
     stand_off = planned_stand_off_m(gsd, camera, vehicle)

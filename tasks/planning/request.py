@@ -54,6 +54,21 @@ def check_camera(camera: Camera) -> None:
         )
 
 
+def check_focus(stand_off_m: float, camera: Camera, vehicle: Vehicle) -> None:
+    """Refuse a camera that is focused once, where the position error leaves its depth of field."""
+    depth = camera.depth_of_field_m(stand_off_m)
+    if camera.autofocus or depth is None or depth >= vehicle.position_error_m:
+        return
+    assert camera.f_number is not None
+    needed = np.ceil(10 * camera.f_number * vehicle.position_error_m / depth) / 10
+    raise BadInput(
+        "camera.autofocus",
+        f"focused once at {stand_off_m:.2f} m it is sharp within ±{1000 * depth:.0f} mm, and the position"
+        f" errs by {1000 * vehicle.position_error_m:.0f} mm",
+        f"Let it focus at each photo, take f/{needed:g} or more, a coarser plan.gsd_mm_px, or use RTK.",
+    )
+
+
 def planned_stand_off_m(gsd_mm_px: float, camera: Camera, vehicle: Vehicle) -> float:
     """The stand-off to fly: closer than the asked ground sample distance needs, by the position error, since
     the photos are judged at stand-off plus error.
@@ -70,7 +85,7 @@ def planned_stand_off_m(gsd_mm_px: float, camera: Camera, vehicle: Vehicle) -> f
         raise BadInput(
             "plan.gsd_mm_px",
             f"{gsd_mm_px:g} mm/px takes this camera at most {farthest:.2f} m from the surface, so it is"
-            f" planned {max(stand_off, 0.0):.2f} m away and may come {error:.2f} m closer (position error), but"
+            f" planned {max(stand_off, 0.0):.2f} m away and may come {error:.2f} m closer (position error);"
             f" the vehicle must stay {vehicle.radius_m + vehicle.clearance_m:.2f} m away (radius"
             f" {vehicle.radius_m:g}, clearance {vehicle.clearance_m:g})",
             f"Ask for {safe:g} mm/px or coarser, take a lens of at least {longer:.0f} px focal length, or"
@@ -86,4 +101,5 @@ def planned_stand_off_m(gsd_mm_px: float, camera: Camera, vehicle: Vehicle) -> f
             f" {vehicle.position_jitter_m:g} m: neighbours would miss each other",
             f"Ask for {enough:g} mm/px or coarser, take a camera with more pixels, or position by RTK.",
         )
+    check_focus(stand_off, camera, vehicle)
     return stand_off

@@ -1,7 +1,7 @@
 """The stage: a structure's surfaces become a flight plan."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +11,16 @@ from artifacts.page import Page
 from artifacts.picture import markdown_of
 from schemas.camera import Camera
 from schemas.contract import Vector3
+from schemas.crack import Crack
 from schemas.flight_plan import FlightPlan
 from schemas.geodesy import GeoOrigin
 from schemas.settings import PlanSettings
 from schemas.structure import Structure
 from schemas.vehicle import Vehicle
 from tasks.stage import progress, stage
+
+if TYPE_CHECKING:
+    from tasks.planning.what_if import Case, Effort
 
 Widths = npt.NDArray[np.float32]
 
@@ -76,8 +80,11 @@ def plan_flight(
     origin: GeoOrigin,
     home_m: Vector3 | None,
     settings: PlanSettings,
+    cracks: tuple[Crack, ...] = (),
 ) -> FlightPlan:
-    """Shooting points over the surfaces to inspect, a tour of them, a collision-free path, and its proof."""
+    """Shooting points over the surfaces to inspect, a tour of them, a collision-free path, and its proof.
+
+    cracks: of an earlier pass, to be looked at closely in place of whole surfaces."""
     import tifffile
 
     from tasks.planning.occupied_points import read_points
@@ -85,7 +92,9 @@ def plan_flight(
 
     shelf = store.current()
     points = read_points(shelf.path(structure.occupied))
-    made, maps = plan_and_prove(structure, points, camera, vehicle, origin, home_m, settings, progress)
+    made, maps = plan_and_prove(
+        structure, points, camera, vehicle, origin, home_m, settings, progress, cracks
+    )
     coverage = []
     with shelf.scratch() as folder:
         for of_surface, widths in zip(made.coverage, maps, strict=True):
@@ -93,6 +102,37 @@ def plan_flight(
             tifffile.imwrite(path, widths.width_mm, compression="zlib", metadata=None)
             coverage.append(of_surface.model_copy(update={"width_map": shelf.put(path)}))
     return made.model_copy(update={"coverage": tuple(coverage)})
+
+
+def what_if(
+    camera: Camera, vehicle: Vehicle, overlap: float, area_m2: float, stand_off_m: float | None
+) -> "list[tuple[Case, Effort]]":
+    """What this camera sees and what an area takes, at the usual crack widths or from one stand-off; no
+    stage: only the command line asks for it."""
+    from tasks.planning.what_if import case_at, cases
+
+    seen = (
+        [case_at(stand_off_m, camera, vehicle, overlap)] if stand_off_m else cases(camera, vehicle, overlap)
+    )
+    return [(one, one.effort(area_m2, vehicle, camera)) for one in seen]
+
+
+def effort(
+    structure: Structure,
+    camera: Camera,
+    vehicle: Vehicle,
+    settings: PlanSettings,
+    cracks: tuple[Crack, ...] = (),
+) -> "Effort":
+    """About what a plan will take, before it is made."""
+    from tasks.planning.close_ups import close_ups
+    from tasks.planning.request import chosen_surfaces
+    from tasks.planning.what_if import effort_of
+
+    surfaces = (
+        close_ups(structure.surfaces, cracks) if cracks else chosen_surfaces(structure, settings.surfaces)
+    )
+    return effort_of(surfaces, camera, vehicle, settings)
 
 
 def width_maps(made: FlightPlan) -> dict[str, Widths]:

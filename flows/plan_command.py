@@ -1,0 +1,205 @@
+"""`hairline plan`: from surfaces to flights, or a table of what a camera could do, on plain files."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import yaml
+from cyclopts import Parameter
+from pydantic import ValidationError
+from rich.table import Table
+
+from flows.command_line import app
+from flows.console import err
+from flows.console import out as console
+from flows.inspection_file import explain
+from flows.plain_files import Many, read_camera, read_contract, say, warn, working
+from flows.structure_commands import enter_beside
+from schemas.problem import BadInput
+from schemas.settings import PlanSettings
+from schemas.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from schemas.camera import Camera
+
+Six = tuple[float, float, float, float, float, float]
+
+
+@app.command
+def plan(
+    surfaces: Path | None = None,
+    *,
+    camera: Path,
+    out: Annotated[Path | None, Parameter(name="--out")] = None,
+    gsd_mm_px: float | None = None,
+    smallest_crack_mm: float | None = None,
+    overlap: float | None = None,
+    inspect: Annotated[tuple[str, ...], Many] = (),
+    clearance_m: float | None = None,
+    radius_m: float | None = None,
+    home_m: tuple[float, float, float] | None = None,
+    origin: tuple[float, float, float] | None = None,
+    free: list[Six] | None = None,
+    close_ups: Path | None = None,
+    what_if: Annotated[bool, Parameter(negative=())] = False,
+    stand_off_m: float | None = None,
+    area_m2: float = 100.0,
+) -> None:
+    """Plan collision-free flights: D/plan.json and for each D/mission.waypoints, .plan, .kmz, .kml and .csv.
+
+    Parameters
+    ----------
+    surfaces:
+        The surfaces.json of `hairline surfaces`, its occupied.ply beside it.
+    camera:
+        YAML with width_px, height_px, and focal_px (or focal_mm and sensor_width_mm). An inspection file does
+        too; its vehicle and plan then count where no option says otherwise.
+    out:
+        Folder to write to.
+    gsd_mm_px:
+        Ground sample distance, mm per pixel. Default: the smallest crack's width.
+    smallest_crack_mm:
+        Smallest crack to detect, mm. Default: 0.3.
+    overlap:
+        Of neighbouring photos, 0.1 to 0.95, widened for the position error. Default: 0.6.
+    inspect:
+        Names of the surfaces to inspect. Default: all but the ground.
+    clearance_m:
+        Least distance between vehicle and anything else, metres. Default: 1.
+    radius_m:
+        Half the vehicle's largest diagonal, propellers included, metres. Default: 0.4.
+    home_m:
+        Take-off and landing place, east north up, metres. Default: a free place beside the structure.
+    origin:
+        Latitude, longitude (degrees) and altitude (metres) of the world's origin (WGS84).
+    free:
+        A box that you vouch for as free of obstacles though no scanner saw it: its low and high corner, east
+        north up, metres. May be given several times.
+    close_ups:
+        The cracks.json of an earlier pass: plan close-ups of these cracks.
+    what_if:
+        No plan, a table: crack width, ground sample distance, stand-off, photos and batteries of this camera.
+    stand_off_m:
+        With --what-if: what is seen from this distance, metres.
+    area_m2:
+        With --what-if: area to photograph, square metres.
+    """
+    lens = read_camera(camera)
+    vehicle, settings = _sections(
+        camera,
+        {"clearance_m": clearance_m, "radius_m": radius_m},
+        {
+            "gsd_mm_px": gsd_mm_px,
+            "smallest_crack_mm": smallest_crack_mm,
+            "overlap": overlap,
+            "surfaces": inspect or None,
+            "free_m": [{"low_m": box[:3], "high_m": box[3:]} for box in free] if free else None,
+        },
+    )
+    if what_if:
+        _what_if(lens, vehicle, settings, area_m2, stand_off_m)
+        return
+    if surfaces is None or out is None:
+        raise BadInput("plan", "needs surfaces.json and --out", "Give both, or --what-if for a table alone")
+    _plan(surfaces, out, lens, vehicle, settings, home_m, origin, close_ups)
+
+
+def _plan(
+    surfaces: Path,
+    out: Path,
+    camera: "Camera",
+    vehicle: Vehicle,
+    settings: PlanSettings,
+    home_m: tuple[float, float, float] | None,
+    origin: tuple[float, float, float] | None,
+    close_ups: Path | None,
+) -> None:
+    from flows.collect_images import REHEARSAL_ORIGIN
+    from flows.results import write_flight_plan
+    from schemas.crack_report import CrackReport
+    from schemas.geodesy import GeoOrigin
+    from schemas.structure import Structure
+    from tasks.planning.task import effort, plan_flight
+
+    structure = read_contract(surfaces, Structure)
+    cracks = read_contract(close_ups, CrackReport).cracks if close_ups else ()
+    where = (
+        GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
+        if origin
+        else REHEARSAL_ORIGIN
+    )
+    about = effort(structure, camera, vehicle, settings, cracks)
+    gsd = settings.asked_gsd_mm_px
+    kind = f"close-ups of {len(cracks)} cracks" if cracks else "photos"
+    say(
+        f"About {about.photos:,} {kind} at {gsd:g} mm/px, {about.hours:.1f} h of flight,"
+        f" {about.batteries} batteries"
+    )
+    with working(out):
+        enter_beside(surfaces, "occupied.ply", structure.occupied.sha256)
+        planned = plan_flight.bare(structure, camera, vehicle, where, home_m, settings, cracks)
+        write_flight_plan(out, planned, copy=True)
+    photos, minutes = len(planned.shooting_points), planned.duration_s / 60
+    many = f" in {len(planned.flights)} flights" if len(planned.flights) > 1 else ""
+    say(f"{photos} photos, {planned.length_m:.0f} m, {minutes:.1f} min{many}: {out / 'plan.json'}")
+    warn(planned.left_out)
+    if origin is None:
+        err.print(
+            "[yellow]Warning: no --origin: the mission lies at ArduPilot's simulator, not at yours[/yellow]"
+        )
+
+
+def _what_if(
+    camera: "Camera", vehicle: Vehicle, settings: PlanSettings, area_m2: float, stand_off_m: float | None
+) -> None:
+    from tasks.planning.task import what_if
+
+    table = Table(title=f"{area_m2:g} m² at {settings.overlap:.0%} overlap", title_justify="left")
+    for heading in (
+        *("detects\nmm", "measures\nmm", "mm/px", "stand-\noff m", "sharp\n± m", "photos\nper m²"),
+        *("photos", "hours", "batteries"),
+    ):
+        table.add_column(heading, justify="right")
+    refused = ""
+    rows = what_if(camera, vehicle, settings.overlap, area_m2, stand_off_m)
+    for one, takes in rows:
+        depth = f"{one.depth_of_field_m:.3f}" if one.depth_of_field_m is not None else "-"
+        seen = [f"{one.detects_mm:.2f}", f"{one.measures_mm:.2f}", f"{one.gsd_mm_px:.3f}"]
+        if one.refused:
+            refused = refused or one.refused
+            table.add_row(*seen, "not flown", depth, *["-"] * 4)
+            continue
+        counts = [
+            f"{one.photos_per_m2:.2f}",
+            f"{takes.photos:,}",
+            f"{takes.hours:.1f}",
+            f"{takes.batteries:,}",
+        ]
+        table.add_row(*seen, f"{one.planned_m:.2f}", depth, *counts)
+    console.print(table)
+    first = rows[0][0]
+    say(
+        f"Sharp to half a pixel at 1/{1 / camera.shutter_s:.0f} s: gimbal and nose slower than"
+        f" {first.sharp_to_deg_s:.2f} °/s, and at {first.gsd_mm_px:g} mm/px slower than"
+        f" {first.sharp_to_m_s:.2f} m/s: the vehicle stops for each photo"
+    )
+    if refused:
+        say(f"Not flown: {refused}")
+
+
+def _sections(path: Path, vehicle: dict[str, Any], asked: dict[str, Any]) -> tuple[Vehicle, PlanSettings]:
+    """The file's vehicle and plan, where it has them, with the options that were given."""
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    content = content if isinstance(content, dict) else {}
+
+    def with_options(section: str, options: dict[str, Any]) -> dict[str, Any]:
+        given = content.get(section)
+        stated = {key: value for key, value in options.items() if value is not None}
+        return {**(given if isinstance(given, dict) else {}), **stated}
+
+    try:
+        return (
+            Vehicle.model_validate(with_options("vehicle", vehicle)),
+            PlanSettings.model_validate(with_options("plan", asked)),
+        )
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
