@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tasks.stitching.blending import ALIGN, REACH, MultiBand
 from tasks.stitching.canvas import Canvas
-from tasks.stitching.gain import gain_table
+from tasks.stitching.gain import Light, gain_table, unvignetted
 from tasks.stitching.seams import label_window, photo_map
 from tasks.stitching.view import View, shrunk
 
@@ -55,14 +55,14 @@ def composite(
     canvas: Canvas,
     views: Sequence[View],
     worth: Sequence[float],
-    gains: npt.NDArray[np.float64],
+    light: Light,
     read: Callable[[int], Pixels],
     on_progress: Callable[[float], None],
 ) -> Iterator[Tile]:
     """Tiles of TILE_PX, row by row, boustrophedon. `read(i)` gives the photo of views[i] as RGB."""
     shrink = [max(1, int(canvas.gsd / v.units_per_px + 0.25)) for v in views]
     used = [shrunk(v, s) for v, s in zip(views, shrink, strict=True)]
-    tables = [gain_table(float(g)) for g in gains]
+    tables = [np.stack([gain_table(float(g)) for g in gains], axis=1)[None] for gains in light.gains]
 
     def read_used(index: int) -> Pixels:
         pixels, camera = read(index), used[index].camera
@@ -78,7 +78,9 @@ def composite(
     with ThreadPoolExecutor(max_workers=workers) as threads:
         for start in range(0, len(corners), workers):
             batch = corners[start : start + workers]
-            yield from threads.map(lambda corner: _tile(corner, canvas, used, worth, tables, cache), batch)
+            yield from threads.map(
+                lambda corner: _tile(corner, canvas, used, worth, tables, light, cache), batch
+            )
             on_progress(min(1.0, (start + workers) / len(corners)))
 
 
@@ -94,6 +96,7 @@ def _tile(
     views: Sequence[View],
     worth: Sequence[float],
     tables: Sequence[npt.NDArray[np.float32]],
+    light: Light,
     read: Callable[[int], Pixels],
 ) -> Tile:
     x, y = corner
@@ -111,7 +114,9 @@ def _tile(
         warped = cv2.remap(
             read(int(i)), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
-        layer = np.asarray(cv2.LUT(warped, tables[i]), np.float32)
+        layer = unvignetted(
+            np.asarray(cv2.LUT(warped, tables[i]), np.float32), at, views[i], light.falloff[i]
+        )
         blend.add(layer, mine[y0:y1, x0:x1].astype(np.float32), x0, y0)
     inner = (slice(REACH, REACH + height), slice(REACH, REACH + width))
     own = label[inner]

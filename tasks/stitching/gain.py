@@ -1,23 +1,43 @@
-"""Gain compensation: one exposure factor a photo, all solved together (Brown & Lowe 2007, section 6).
+"""Gain compensation: an exposure factor a photo and a lens's falloff a camera, all solved together (Brown &
+Lowe 2007, section 6; Goldman 2010), then each photo's colour balance.
 
-Photos are compared in linear light, in overlaps as placed by the adjustment, by the median of the logarithm
-of their ratio: shadows that moved and highlights that are clipped do not count."""
+Photos are compared in linear light where they overlap, as placed by the adjustment. Without the falloff, the
+darker rim of each photo would pass for a darker photo, and gains would drift across the mosaic. Sums of
+absolute differences: shadows that moved and highlights that are clipped hardly count."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csr_matrix
 
+from tasks.stitching.bundle import camera_key
 from tasks.stitching.skyline import solve_positive
 from tasks.stitching.view import Array, View
 
 Pixels = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
 
 SHRINK = 8  # photos are averaged over squares of so many pixels before they are compared
-SAMPLES = 40  # a side of the grid laid over each photo
-SIGMA_PRIOR = 0.3  # 1σ of a photo's log exposure; binds only what overlaps nothing
+SAMPLES = 24  # a side of the grid laid over each photo
+SIGMA_GAIN = 0.3  # 1σ of a photo's log exposure; binds only what overlaps nothing
+SIGMA_FALLOFF = 0.5  # 1σ of the log of a lens's falloff in the corner, each of its two terms
+SIGMA_BALANCE = 0.05  # 1σ of the log of red and blue against green
+SOFT = 0.01  # log ratios that differ by more count by their absolute value
+ROUNDS = 10
 LEAST_SAMPLES = 20
+TERMS = 2  # of the falloff: squared and fourth power of the distance from the middle
+RIM = 1.3  # farther out than this, in squared half diagonals, no photo reaches
+
+
+@dataclass(frozen=True)
+class Light:
+    """What brings photos to one light: factors on linear light, geometric mean 1 for each colour."""
+
+    gains: Array  # (N, 3) of red, green, blue
+    falloff: Array  # (N, TERMS) log of the factor is falloff · (ρ², ρ⁴), ρ = 1 in the corner
 
 
 def srgb_to_linear() -> npt.NDArray[np.float32]:
@@ -33,74 +53,113 @@ def gain_table(gain: float) -> npt.NDArray[np.float32]:
     return (255.0 * srgb).astype(np.float32)
 
 
-def solve_gains(
+def unvignetted(layer: Floats, at: Floats, view: View, falloff: Array) -> Floats:
+    """(h, w, 3) sRGB levels of photo pixels `at` (h, w, 2), the lens's falloff undone.
+
+    A factor on linear light is one on the sRGB level + 14.025, but for the darkest ten levels."""
+    if not falloff.any():
+        return layer
+    rho2 = _rho2(at, view)[..., None]
+    factor = np.exp(rho2 * (falloff[0] + rho2 * falloff[1]) / 2.4).astype(np.float32)
+    return np.asarray((layer + np.float32(14.025)) * factor - np.float32(14.025))
+
+
+def _rho2(at: npt.NDArray[np.floating], view: View) -> npt.NDArray[np.floating]:
+    """Squared distance of photo pixels (…, 2) from the middle, 1 in the corners."""
+    w, h = view.camera.width_px, view.camera.height_px
+    off = at - np.array([(w - 1) / 2, (h - 1) / 2], at.dtype)
+    return np.asarray(np.minimum((off**2).sum(axis=-1) * at.dtype.type(4.0 / (w * w + h * h)), RIM))
+
+
+def solve_light(
     views: Sequence[View],
     read: Callable[[int], Pixels],
     pairs: Sequence[tuple[int, int]],
     on_progress: Callable[[float], None],
-) -> Array:
-    """(N,) factors on linear light, geometric mean 1. `read(i)` gives photo i as RGB; one at a time."""
+) -> Light:
+    """`read(i)` gives photo i as RGB; one at a time."""
     count = len(views)
     small = []
     for i in range(count):
         small.append(_linear_small(read(i)))
         on_progress((i + 1) / count)
-    ratios = []
-    for i, j in pairs:
-        ratio = _log_ratio(views[i], views[j], small[i], small[j])
-        if ratio is not None:
-            ratios.append((i, j, *ratio))
-    if not ratios:
-        return np.ones(count)
-    a, b = np.array([r[0] for r in ratios]), np.array([r[1] for r in ratios])
-    measured, sigma = np.array([r[2] for r in ratios]), np.array([r[3] for r in ratios])
-    log_gain = np.zeros(count)
-    robust = np.ones(len(ratios))
-    for _ in range(10):  # log g_a − log g_b = −measured, L1 beyond a few per cent
-        w = robust / sigma**2
-        A = np.diag(np.full(count, SIGMA_PRIOR**-2.0))
-        right = np.zeros(count)
-        np.add.at(A, (a, a), w)
-        np.add.at(A, (b, b), w)
-        np.add.at(A, (a, b), -w)
-        np.add.at(A, (b, a), -w)
-        np.add.at(right, a, -w * measured)
-        np.add.at(right, b, w * measured)
-        log_gain = solve_positive(A, right)
-        left = np.abs(measured + log_gain[a] - log_gain[b])
-        robust = 1.0 / np.maximum(left / np.maximum(3 * sigma, 0.02), 1.0)
-    return np.asarray(np.exp(log_gain - log_gain.mean()))
+    found = [_overlap(i, j, views, small) for i, j in pairs]
+    samples = [s for s in found if len(s.ratio) >= LEAST_SAMPLES]
+    keys = [camera_key(view.camera) for view in views]
+    cameras = list(dict.fromkeys(keys))
+    camera_of = np.array([cameras.index(key) for key in keys])
+    if not samples:
+        return Light(np.ones((count, 3)), np.zeros((count, TERMS)))
+    a = np.concatenate([np.full(len(s.ratio), s.a) for s in samples])
+    b = np.concatenate([np.full(len(s.ratio), s.b) for s in samples])
+    ratio = np.concatenate([s.ratio for s in samples])
+    rho2_a, rho2_b = (np.concatenate([s.rho2[k] for s in samples]) for k in range(2))
+    row, one = np.arange(len(a)), np.ones(len(a))
+    rows, columns, values = [row, row], [a, b], [one, -one]
+    for k in range(TERMS):
+        rows += [row, row]
+        columns += [count + TERMS * camera_of[a] + k, count + TERMS * camera_of[b] + k]
+        values += [rho2_a ** (k + 1), -(rho2_b ** (k + 1))]
+    size = count + TERMS * len(cameras)
+    design = csr_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(len(a), size)
+    )
+    prior = np.r_[np.full(count, SIGMA_GAIN), np.full(size - count, SIGMA_FALLOFF)]
+    green = _least_absolute(design, -ratio[:, 1], prior)
+    exposures = design[:, :count].tocsr()
+    balance = np.full(count, SIGMA_BALANCE)
+    logs = [green[:count]] * 3
+    for c in (0, 2):
+        logs[c] = green[:count] + _least_absolute(exposures, ratio[:, 1] - ratio[:, c], balance)
+    gains = np.stack(logs, axis=1)
+    falloff = green[count:].reshape(-1, TERMS)[camera_of]
+    return Light(np.asarray(np.exp(gains - gains.mean(axis=0))), falloff)
 
 
-def _linear_small(pixels: Pixels) -> npt.NDArray[np.float32]:
-    """(h, w) linear light, mean of the colours; averaged in sRGB over 2 pixels, then in linear light."""
+def _least_absolute(design: csr_matrix, measured: Array, sigma: Array) -> Array:
+    """x of design · x = measured with the least sum of absolute differences beyond SOFT."""
+    robust = np.ones(len(measured))
+    x = np.zeros(design.shape[1])
+    for _ in range(ROUNDS):
+        weighted = design.multiply((robust / SOFT**2)[:, None]).tocsr()
+        A = (design.T @ weighted).toarray() + np.diag(sigma**-2.0)
+        x = solve_positive(A, weighted.T @ measured)
+        robust = 1.0 / np.maximum(np.abs(design @ x - measured) / SOFT, 1.0)
+    return x
+
+
+def _linear_small(pixels: Pixels) -> Floats:
+    """(h, w, 3) linear light; averaged in sRGB over 2 pixels, then in linear light."""
     height, width = pixels.shape[:2]
     half = cv2.resize(pixels, (max(width // 2, 1), max(height // 2, 1)), interpolation=cv2.INTER_AREA)
-    linear = cv2.LUT(half, srgb_to_linear()).mean(axis=2)
     size = (max(width // SHRINK, 1), max(height // SHRINK, 1))
-    return np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA))
+    return np.asarray(cv2.resize(cv2.LUT(half, srgb_to_linear()), size, interpolation=cv2.INTER_AREA))
 
 
-def _log_ratio(
-    a: View, b: View, light_a: npt.NDArray[np.float32], light_b: npt.NDArray[np.float32]
-) -> tuple[float, float] | None:
-    """Median of log(light a / light b) over the overlap and its standard error."""
+@dataclass(frozen=True)
+class _Overlap:
+    a: int
+    b: int
+    ratio: Array  # (S, 3) log(light a / light b)
+    rho2: tuple[Array, Array]  # (S,) in a and in b
+
+
+def _overlap(i: int, j: int, views: Sequence[View], small: Sequence[Floats]) -> _Overlap:
+    a, b = views[i], views[j]
     w, h = a.camera.width_px - 1.0, a.camera.height_px - 1.0
     x, y = np.meshgrid(np.linspace(0, w, SAMPLES), np.linspace(0, h, SAMPLES))
     uv = a.to_plane(np.column_stack([x.ravel(), y.ravel()]))
-    values_a, inside_a = _sample(light_a, a, uv)
-    values_b, inside_b = _sample(light_b, b, uv)
-    fit = (values_a > 0.004) & (values_b > 0.004) & (values_a < 0.9) & (values_b < 0.9)
-    good = inside_a & inside_b & fit
-    if good.sum() < LEAST_SAMPLES:
-        return None
-    logs = np.log(values_a[good] / values_b[good])
-    middle = float(np.median(logs))
-    spread = 1.4826 * float(np.median(np.abs(logs - middle)))
-    return middle, max(1.2533 * spread / float(np.sqrt(good.sum())), 1e-4)
+    light_a, at_a, inside_a = _sample(small[i], a, uv)
+    light_b, at_b, inside_b = _sample(small[j], b, uv)
+    light = np.concatenate([light_a, light_b], axis=1)
+    good = inside_a & inside_b & (light.min(axis=1) > 0.004) & (light.max(axis=1) < 0.9)
+    ratio = np.log(light_a[good] / light_b[good])
+    rho2_a, rho2_b = (np.asarray(_rho2(at[good], of), np.float64) for at, of in ((at_a, a), (at_b, b)))
+    return _Overlap(i, j, ratio, (rho2_a, rho2_b))
 
 
-def _sample(light: npt.NDArray[np.float32], view: View, uv: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+def _sample(light: Floats, view: View, uv: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """(N, 3) light, (N, 2) photo pixels and whether they are in the photo."""
     with np.errstate(invalid="ignore"):
         photo = np.nan_to_num(view.to_photo(uv), nan=-1e6)
     scale = np.array([light.shape[1] / view.camera.width_px, light.shape[0] / view.camera.height_px])
@@ -108,4 +167,4 @@ def _sample(light: npt.NDArray[np.float32], view: View, uv: Array) -> tuple[Arra
     inside = ((at >= 0) & (at <= np.array([light.shape[1] - 1, light.shape[0] - 1]))).all(axis=1)
     x, y = at.astype(np.float32).T
     values = cv2.remap(light, x[:, None], y[:, None], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return values.ravel().astype(np.float64), inside
+    return values.reshape(-1, 3).astype(np.float64), photo, inside

@@ -12,7 +12,7 @@ from schemas.settings import StitchSettings
 from schemas.surface import Surface
 from tasks.stitching.canvas import Canvas, lay_out
 from tasks.stitching.compositing import Pixels, Tile, composite
-from tasks.stitching.gain import solve_gains
+from tasks.stitching.gain import solve_light
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.placement import Fate, fates, unusable
 from tasks.stitching.prior import plane_frame
@@ -89,14 +89,14 @@ def blend_photos(
     position = {i: k for k, i in enumerate(shown)}
     views = [view for i in shown if (view := registered.fates[i].view) is not None]
     pairs = [(position[a], position[b]) for a, b in registered.pairs]
-    gains = solve_gains(views, lambda k: read(shown[k]), pairs, lambda f: on_progress(0.3 * f))
+    light = solve_light(views, lambda k: read(shown[k]), pairs, lambda f: on_progress(0.3 * f))
     every = np.ones(len(registered.photos))
-    every[shown] = gains
+    every[shown] = light.gains[:, 1]
     tiles = composite(
         registered.canvas,
         views,
         [_worth(registered, i) for i in shown],
-        gains,
+        light,
         lambda k: read(shown[k]),
         lambda f: on_progress(0.3 + 0.7 * f),
     )

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from schemas.photo import Photo
 from tasks.stitching.pairs import PhotoFeatures
-from tasks.stitching.prior import Prior
+from tasks.stitching.prior import PlaneFrame, Prior
 from tasks.stitching.view import Array, View
 
 BLURRED = 0.3  # of the median sharpness: scenes differ by a fifth, 4 px of blur by four to ten
@@ -16,6 +17,8 @@ STRONG = 0.02 / 3  # response of a feature that is no noise
 TEXTURED = 200  # strong features that a photo has for sure when it could have been matched
 OVERLAP = 0.3  # share of a photo that solved ones must cover, before not matching them speaks against it
 FAR_SIGMAS = 5.0  # a solved photo so far from its stated position is worth a word
+SURE_SIGMAS = 2.0  # a photo is covered for sure where it is, moved by so many sigma to any side
+AROUND = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], float)
 NEAREST = 3  # solved photos whose position errors a placed one borrows
 
 Status = Literal["solved", "placed", "rejected"]
@@ -61,7 +64,7 @@ def fates(
             view = _place(prior, priors, solved)
             if view is None:
                 result.append(Fate("rejected", "no photo could be matched, and the distance is not known"))
-            elif _should_match(view, features[i], solved, features):
+            elif _should_match(view, prior, features[i], solved, features):
                 reason = (
                     "shows texture but does not match the photos around its stated position: another place"
                 )
@@ -102,10 +105,34 @@ def _place(prior: Prior, priors: Sequence[Prior], solved: dict[int, View]) -> Vi
     return replace(view, C=C, camera=same[0] if same else view.camera)
 
 
+def elsewhere(
+    component: npt.NDArray[np.int64],
+    held: set[int],
+    views: Sequence[View],
+    frame: PlaneFrame,
+    features: Sequence[PhotoFeatures],
+) -> set[int]:
+    """Photos of connected groups that lie where a larger group lies, yet match none of it: another place."""
+    strangers: set[int] = set()
+    for number in range(1, int(component.max(initial=-1)) + 1):
+        members = [i for i in sorted(held) if component[i] == number]
+        others = {i: views[i] for i in held if component[i] < number and i not in strangers}
+        if members and all(
+            _should_match(views[i], frame.priors[i], features[i], others, features) for i in members
+        ):
+            strangers |= set(members)
+    return strangers
+
+
 def _should_match(
-    view: View, own: PhotoFeatures, solved: dict[int, View], features: Sequence[PhotoFeatures]
+    view: View,
+    prior: Prior,
+    own: PhotoFeatures,
+    solved: dict[int, View],
+    features: Sequence[PhotoFeatures],
 ) -> bool:
-    """Both it and the solved photos that cover it have texture: then not matching means another place."""
+    """Both it and the solved photos that cover it, wherever it lies within its position's error, have
+    texture: then not matching means another place."""
     if not solved or _strong(own) < TEXTURED:
         return False
     if float(np.median([_strong(features[k]) for k in solved])) < TEXTURED:
@@ -113,10 +140,13 @@ def _should_match(
     w, h = view.camera.width_px - 1.0, view.camera.height_px - 1.0
     x, y = np.meshgrid(np.linspace(0, w, 12), np.linspace(0, h, 9))
     uv = view.to_plane(np.column_stack([x.ravel(), y.ravel()]))
-    covered = np.zeros(len(uv), bool)
-    for other in solved.values():
-        covered |= _inside(other, uv)
-    return float(covered.mean()) > OVERLAP
+    sure = np.ones(len(uv), bool)
+    for shift in SURE_SIGMAS * float(prior.sigma_position[:2].max()) * AROUND:
+        covered = np.zeros(len(uv), bool)
+        for other in solved.values():
+            covered |= _inside(other, uv + shift)
+        sure &= covered
+    return float(sure.mean()) > OVERLAP
 
 
 def _inside(view: View, uv: Array) -> Array:

@@ -39,7 +39,8 @@ def label_window(
 ) -> npt.NDArray[np.int32]:
     """(h, w) index into `views` of the photo each pixel comes from; −1 where none sees it.
 
-    A photo counts by its distance from the frame's border, in plane units, times its `worth`."""
+    A photo counts by its pixels' distance from the frame's border, times its `worth`, times how squarely it
+    looks: of two that see a point alike deep inside their frames, the finer and less slanted wins."""
     best = np.zeros((height, width), np.float32)
     label = np.full((height, width), -1, np.int32)
     for i, view in enumerate(views):
@@ -51,7 +52,7 @@ def label_window(
         right, bottom = view.camera.width_px - 1, view.camera.height_px - 1
         x, y = at[..., 0], at[..., 1]
         inside = np.minimum(np.minimum(x, right - x), np.minimum(y, bottom - y))
-        depth = (inside + np.float32(1e-3)) * np.float32(worth[i] * view.units_per_px / canvas.gsd)
+        depth = (inside + np.float32(1e-3)) * np.float32(worth[i] * -view.R[2, 2])
         window = (slice(ay0 - y0, ay1 - y0), slice(ax0 - x0, ax1 - x0))
         better = depth > best[window]
         best[window][better] = depth[better]

@@ -9,6 +9,7 @@ from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.averaging import Guess, average
 from tasks.stitching.candidates import candidate_pairs
 from tasks.stitching.pairs import PhotoFeatures, match_pairs
+from tasks.stitching.placement import elsewhere
 from tasks.stitching.prior import PlaneFrame
 from tasks.stitching.tracks import Observations, build_tracks
 from tasks.stitching.view import Array, View
@@ -58,6 +59,9 @@ def solve(
             lambda f: on_progress(0.6 + 0.4 * f),
         )
         loose = _loose(observations, adjusted)
+        loose |= elsewhere(
+            guess.component, set(map(int, np.unique(observations.photo))), adjusted.views, frame, features
+        )
         if not loose:
             return _solved(adjusted, matched - len(edges))
         edges = [e for e in edges if e.a not in loose and e.b not in loose]

@@ -71,8 +71,8 @@ def _noise(bundle: Bundle, residual: Array, weight: Array) -> float:
     cells = int(cell.max()) + 1
     count = np.bincount(cell, minlength=cells)
     total = np.bincount(cell, share, minlength=cells)
-    mean = np.stack([np.bincount(cell, share * r, minlength=cells) for r in residual.T], axis=1)
-    mean = mean / np.maximum(total, 1e-12)[:, None]
+    sums = np.stack([np.bincount(cell, share * r, minlength=cells) for r in residual.T], axis=1)
+    mean = np.asarray(sums / np.maximum(total, 1e-12)[:, None], np.float64)
     used = count >= FEWEST
     if not used.any():
         return float((share * (residual**2).sum(axis=1)).sum() / (2 * share.sum()))
