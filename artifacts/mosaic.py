@@ -1,11 +1,14 @@
-"""Mosaics on disk: image, coverage and source as tiled TIFF (deflate), written tile by tile as they come."""
+"""Mosaics on disk: image, coverage and source as tiled, pyramidal TIFF (deflate), written as tiles come."""
 
 import json
 import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 import tifffile
@@ -15,9 +18,39 @@ CLASSIC_LIMIT = 3_500_000_000  # raw bytes from which on the file is a BigTIFF
 LEVEL = 1  # of deflate: photos hardly compress, so quickly
 
 
+@dataclass(frozen=True)
+class Georeference:
+    """u and v in metres of the middle of the first pixel, in the frame that `frame` names."""
+
+    gsd_mm_px: float | None
+    origin_uv_m: tuple[float, float]
+    frame: str
+
+    @property
+    def description(self) -> str:
+        told = {
+            "gsd_mm_px": self.gsd_mm_px,
+            "origin_uv_m": self.origin_uv_m,
+            "frame": self.frame,
+            "convention": "u = origin_u + x·gsd, v = origin_v − y·gsd; pixel centres at integers",
+        }
+        return json.dumps(told, sort_keys=True)
+
+    @property
+    def tags(self) -> list[tuple[int, str, int, tuple[float, ...], bool]]:
+        """ModelPixelScale and ModelTiepoint of GeoTIFF (metres, first pixel's outer corner): programs for
+        maps then measure in metres of the plane."""
+        if self.gsd_mm_px is None:
+            return []
+        step, (u, v) = self.gsd_mm_px / 1000.0, self.origin_uv_m
+        corner = (0.0, 0.0, 0.0, u - step / 2, v + step / 2, 0.0)
+        return [(33550, "d", 3, (step, step, 0.0), True), (33922, "d", 6, corner, True)]
+
+
 class TiledTiff:
-    """Takes windows in any order, each on multiples of TILE_PX, and writes a TIFF when closed. Compressed
-    tiles wait in a file beside it; what never came stays zero. Same pixels, same bytes."""
+    """Takes windows in any order, each on multiples of TILE_PX, and writes a TIFF when closed: the picture,
+    then halves of it (in SubIFDs) until one fits a tile. Compressed tiles wait in a file beside it; what
+    never came stays zero. Same pixels, same bytes; memory holds a few tiles."""
 
     def __init__(
         self,
@@ -26,14 +59,16 @@ class TiledTiff:
         height_px: int,
         channels: int,
         dtype: type[np.generic],
-        description: dict[str, Any],
-        gsd_mm_px: float | None = None,
+        place: Georeference,
     ) -> None:
-        self._path, self._dtype, self._gsd_mm_px = path, np.dtype(dtype), gsd_mm_px
-        self._shape = (height_px, width_px) if channels == 1 else (height_px, width_px, channels)
-        self._description = json.dumps(description, sort_keys=True)
-        self._columns, self._rows = -(-width_px // TILE_PX), -(-height_px // TILE_PX)
-        self._where: dict[int, tuple[int, int]] = {}  # tile → offset and size in the waiting file
+        self._path, self._dtype, self._place = path, np.dtype(dtype), place
+        self._channels = () if channels == 1 else (channels,)
+        self._levels = [(height_px, width_px)]
+        while max(self._levels[-1]) > TILE_PX:
+            height, width = self._levels[-1]
+            self._levels.append((-(-height // 2), -(-width // 2)))
+        # level, row, column of a tile → offset and size in the waiting file
+        self._where: dict[tuple[int, int, int], tuple[int, int]] = {}
         self._waiting = path.with_name(path.name + ".tiles")
         self._stream = self._waiting.open("wb+")
 
@@ -44,44 +79,73 @@ class TiledTiff:
         for top in range(0, pixels.shape[0], TILE_PX):
             for left in range(0, pixels.shape[1], TILE_PX):
                 tile = pixels[top : top + TILE_PX, left : left + TILE_PX]
-                index = (y + top) // TILE_PX * self._columns + (x + left) // TILE_PX
-                data = self._compressed(tile)
-                self._where[index] = (self._stream.seek(0, 2), len(data))
-                self._stream.write(data)
+                self._keep((0, (y + top) // TILE_PX, (x + left) // TILE_PX), tile)
 
-    def _compressed(self, tile: npt.NDArray[Any]) -> bytes:
-        full = np.zeros((TILE_PX, TILE_PX, *self._shape[2:]), self._dtype)
+    def _keep(self, place: tuple[int, int, int], tile: npt.NDArray[Any]) -> None:
+        full = np.zeros((TILE_PX, TILE_PX, *self._channels), self._dtype)
         full[: tile.shape[0], : tile.shape[1]] = tile
-        return zlib.compress(full.tobytes(), LEVEL)
+        if full.any():
+            data = zlib.compress(full.tobytes(), LEVEL)
+            self._where[place] = (self._stream.seek(0, 2), len(data))
+            self._stream.write(data)
+
+    def _waiting_bytes(self, place: tuple[int, int, int]) -> bytes:
+        offset, size = self._where[place]
+        self._stream.seek(offset)
+        return self._stream.read(size)
+
+    def _halve(self, level: int) -> None:
+        """Tiles of `level` from those of the finer one: means of colours, every second of all else."""
+        for _, row, column in sorted({(level, r // 2, c // 2) for n, r, c in self._where if n == level - 1}):
+            wide = np.zeros((2 * TILE_PX, 2 * TILE_PX, *self._channels), self._dtype)
+            for r, c in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                finer = (level - 1, 2 * row + r, 2 * column + c)
+                if finer in self._where:
+                    raw = np.frombuffer(zlib.decompress(self._waiting_bytes(finer)), self._dtype)
+                    window = (slice(r * TILE_PX, (r + 1) * TILE_PX), slice(c * TILE_PX, (c + 1) * TILE_PX))
+                    wide[window] = raw.reshape(TILE_PX, TILE_PX, *self._channels)
+            if self._channels:
+                half = cv2.resize(wide, (TILE_PX, TILE_PX), interpolation=cv2.INTER_AREA)
+            else:
+                half = wide[::2, ::2]
+            self._keep((level, row, column), half)
 
     def close(self) -> None:
-        blank = self._compressed(np.zeros((0, 0, *self._shape[2:]), self._dtype))
+        for level in range(1, len(self._levels)):
+            self._halve(level)
+        blank = zlib.compress(
+            bytes(TILE_PX * TILE_PX * max(self._channels, default=1) * self._dtype.itemsize), LEVEL
+        )
 
-        def tiles() -> Any:
-            for index in range(self._columns * self._rows):
-                if index not in self._where:
-                    yield blank
-                    continue
-                offset, size = self._where[index]
-                self._stream.seek(offset)
-                yield self._stream.read(size)
+        def tiles(level: int) -> Iterator[bytes]:
+            height, width = self._levels[level]
+            for row in range(-(-height // TILE_PX)):
+                for column in range(-(-width // TILE_PX)):
+                    place = (level, row, column)
+                    yield self._waiting_bytes(place) if place in self._where else blank
 
-        per_cm = None if self._gsd_mm_px is None else 10.0 / self._gsd_mm_px
-        raw = int(np.prod(self._shape)) * self._dtype.itemsize
+        gsd_mm_px = self._place.gsd_mm_px
+        raw = int(np.prod((*self._levels[0], *self._channels))) * self._dtype.itemsize
         with tifffile.TiffWriter(self._path, bigtiff=raw > CLASSIC_LIMIT) as writer:
-            writer.write(
-                tiles(),
-                shape=self._shape,
-                dtype=self._dtype,
-                tile=(TILE_PX, TILE_PX),
-                compression="zlib",
-                photometric="rgb" if len(self._shape) == 3 else "minisblack",
-                description=self._description,
-                software="hairline",
-                metadata=None,
-                resolution=None if per_cm is None else (per_cm, per_cm),
-                resolutionunit=None if per_cm is None else "CENTIMETER",
-            )
+            for level, size in enumerate(self._levels):
+                first = level == 0
+                per_cm = None if gsd_mm_px is None else 10.0 / gsd_mm_px / 2**level
+                writer.write(
+                    tiles(level),
+                    shape=(*size, *self._channels),
+                    dtype=self._dtype,
+                    tile=(TILE_PX, TILE_PX),
+                    compression="zlib",
+                    photometric="rgb" if self._channels else "minisblack",
+                    description=self._place.description if first else None,
+                    software="hairline" if first else None,
+                    metadata=None,
+                    resolution=None if per_cm is None else (per_cm, per_cm),
+                    resolutionunit=None if per_cm is None else "CENTIMETER",
+                    subifds=len(self._levels) - 1 if first else None,
+                    subfiletype=0 if first else 1,
+                    extratags=self._place.tags if first else (),
+                )
         self._discard()
 
     def _discard(self) -> None:
@@ -112,19 +176,14 @@ class MosaicWriter:
         origin_uv_m: tuple[float, float],
         frame: str,
     ) -> None:
-        description = {
-            "gsd_mm_px": gsd_mm_px,
-            "origin_uv_m": origin_uv_m,
-            "frame": frame,
-            "convention": "u = origin_u + x·gsd, v = origin_v − y·gsd; pixel centres at integers",
-        }
+        place = Georeference(gsd_mm_px, origin_uv_m, frame)
         self.image, self.coverage, self.source = (
             folder / f"{name}.tif" for name in ("image", "coverage", "source")
         )
         self._files = [
-            TiledTiff(self.image, width_px, height_px, 3, np.uint8, description, gsd_mm_px),
-            TiledTiff(self.coverage, width_px, height_px, 1, np.uint8, description, gsd_mm_px),
-            TiledTiff(self.source, width_px, height_px, 1, np.uint16, description, gsd_mm_px),
+            TiledTiff(self.image, width_px, height_px, 3, np.uint8, place),
+            TiledTiff(self.coverage, width_px, height_px, 1, np.uint8, place),
+            TiledTiff(self.source, width_px, height_px, 1, np.uint16, place),
         ]
         self.covered_px = 0
 

@@ -7,16 +7,18 @@ import pytest
 import tifffile
 from PIL import Image
 
-from artifacts.mosaic import TILE_PX, MosaicWriter, TiledTiff
+from artifacts.mosaic import TILE_PX, Georeference, MosaicWriter, TiledTiff
 from artifacts.raster import TiffWindows
 from artifacts.store import digest
+
+PLACE = Georeference(0.5, (1.0, 2.0), "surface wall")
 
 
 def test_windows_in_any_order_make_one_picture(tmp_path: Path) -> None:
     picture = np.random.default_rng(0).integers(0, 255, (700, 900, 3)).astype(np.uint8)
     corners = [(x, y) for y in range(0, 700, 2 * TILE_PX) for x in range(0, 900, 2 * TILE_PX)]
     for name, order in (("a.tif", corners), ("b.tif", corners[::-1])):
-        with TiledTiff(tmp_path / name, 900, 700, 3, np.uint8, {"gsd_mm_px": 0.5}, 0.5) as out:
+        with TiledTiff(tmp_path / name, 900, 700, 3, np.uint8, PLACE) as out:
             for x, y in order:
                 out.put(x, y, picture[y : y + 2 * TILE_PX, x : x + 2 * TILE_PX])
     assert digest(tmp_path / "a.tif") == digest(tmp_path / "b.tif")
@@ -29,6 +31,12 @@ def test_windows_in_any_order_make_one_picture(tmp_path: Path) -> None:
         across, per = tags["XResolution"].value
         assert across / per == pytest.approx(20.0)  # pixels a centimetre at 0.5 mm
         assert tags["Software"].value == "hairline"
+        assert tags["ModelPixelScaleTag"].value == (0.0005, 0.0005, 0.0)
+        assert tags["ModelTiepointTag"].value[3:5] == pytest.approx((0.99975, 2.00025))
+        levels = [page.shape[:2] for page in file.series[0].levels]
+        assert levels == [(700, 900), (350, 450), (175, 225)]
+        mean = picture.astype(float).reshape(350, 2, 450, 2, 3).mean(axis=(1, 3))
+        assert np.abs(file.series[0].levels[1].asarray() - mean).max() <= 0.5
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.tif", "b.tif"]
 
 
@@ -53,7 +61,7 @@ def test_a_failed_mosaic_leaves_nothing_behind(tmp_path: Path) -> None:
 
 
 def test_a_window_off_the_tiles_is_refused(tmp_path: Path) -> None:
-    out = TiledTiff(tmp_path / "c.tif", 600, 600, 1, np.uint8, {})
+    out = TiledTiff(tmp_path / "c.tif", 600, 600, 1, np.uint8, Georeference(None, (0.0, 0.0), "own plane"))
     with pytest.raises(ValueError, match="does not start on a tile"):
         out.put(7, 0, np.zeros((10, 10), np.uint8))
     out.close()
