@@ -21,6 +21,8 @@ _PLY_TYPES = {
 }  # fmt: skip
 LARGEST_M = 10_000.0  # no structure is this long; a wrong unit or a stray point is
 MOST_AWAY = 0.1  # of a station's normals; a grazing view turns a few
+LOOK_DEG = 1.5  # cells of a station's view,
+ONE_RANGE = 0.75  # of all points, in cells of one range; from a scanner's place ≥ 0.82, from others ≤ 0.64
 _NORMAL_NEIGHBOURS = 16  # of a point, when the file has no normals
 
 
@@ -81,6 +83,11 @@ def read_cloud(path: Path, item: str, stations_m: Floats) -> Cloud:
     else:
         owner = cKDTree(stations_m).query(points)[1]
     views, sides_known = _views(points, normals, owner, stations_m)
+    if sides_known and len(stations_m) == 1 and not _stood_at(points, stations_m[0]):
+        from tasks.surfaces.open_side import to_open_side
+
+        normals = to_open_side(points, normals)
+        return Cloud(points, normals, normals, sides_known=False)
     return Cloud(points, normals, views, sides_known)
 
 
@@ -93,6 +100,22 @@ def _views(points: Floats, normals: Floats, owner: Indices, stations_m: Floats) 
     owned = np.bincount(owner, minlength=len(stations_m))
     doubted = np.bincount(owner, away, len(stations_m)) > MOST_AWAY * owned
     return np.where(doubted[owner, None], normals, views), not doubted.any()
+
+
+def _stood_at(points: Floats, station_m: Floats) -> bool:
+    """Whether one scanner there can have seen all: from there one sees one range in most directions. A merged
+    cloud has no such place, and its normals were turned to its origin by mistake."""
+    ray = points - station_m
+    range_m = np.linalg.norm(ray, axis=1)
+    level = np.degrees(np.arcsin(np.clip(ray[:, 2] / np.maximum(range_m, 1e-9), -1.0, 1.0)))
+    turn = np.degrees(np.arctan2(ray[:, 1], ray[:, 0]))
+    cell = np.floor(level / LOOK_DEG).astype(np.int64) * 1000 + np.floor(turn / LOOK_DEG).astype(np.int64)
+    order = np.lexsort((range_m, cell))
+    first = np.flatnonzero(np.diff(cell[order], prepend=-(2**62)))
+    end = np.append(first[1:], len(order))
+    nearest_m, farthest_m = range_m[order][first], range_m[order][end - 1]
+    single = farthest_m - nearest_m < 0.1 * nearest_m + 1.0
+    return float((end - first)[single].sum()) >= ONE_RANGE * len(points)
 
 
 def write_points(path: Path, points_m: Floats) -> None:

@@ -62,7 +62,8 @@ def find_terrain(cloud: Cloud, smallest_m2: float) -> Terrain:
     labels = _steps_joined(height_m)
     pieces = []
     ground = np.zeros(height_m.shape, dtype=bool)
-    on_it = level & (cloud.points[:, 2] <= height_m.ravel()[cell] + ROUGH_M)
+    lies = level if cloud.sides_known else np.abs(cloud.normals[:, 2]) >= LEVEL_COSINE  # whatever its sign
+    on_it = lies & (cloud.points[:, 2] <= height_m.ravel()[cell] + ROUGH_M)
     cells = np.bincount(labels[labels >= 0])
     for label in np.flatnonzero(cells * cell_m**2 >= SMALLEST * smallest_m2):
         own = labels == label

@@ -25,7 +25,7 @@ def voxelise(cloud: Cloud, voxel_m: float) -> tuple[Cloud, Indices]:
     negative = np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] < 0
     keys = voxel_keys(cloud.points, voxel_m) * 6 + axis * 2 + negative
     group = np.unique(keys, return_inverse=True)[1]
-    means = [_group_means(values, group) for values in (cloud.points, normals, cloud.views)]
+    means = [group_means(values, group) for values in (cloud.points, normals, cloud.views)]
     return Cloud(means[0], unit(means[1]), unit(means[2]), cloud.sides_known), group
 
 
@@ -33,9 +33,9 @@ def thin(points_m: Floats, voxel_m: float) -> Floats:
     """The mean point of each voxel."""
     if not len(points_m):
         return points_m
-    return _group_means(points_m, np.unique(voxel_keys(points_m, voxel_m), return_inverse=True)[1])
+    return group_means(points_m, np.unique(voxel_keys(points_m, voxel_m), return_inverse=True)[1])
 
 
-def _group_means(values: Floats, group: Indices) -> Floats:
+def group_means(values: Floats, group: Indices) -> Floats:
     counts = np.bincount(group)
     return np.column_stack([np.bincount(group, weights=column) / counts for column in values.T])

@@ -1,0 +1,329 @@
+"""Rows of `make bench-scans` on surfaces and obstacles: against truth, and beside Open3D on the same clouds.
+
+Each seed has its own noise, trees, and stations moved by half a metre. What is scored is in surface_score.py.
+Open3D's planes get our outlines (their time is not counted), its planar patches their own boxes.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import open3d as o3d
+
+from schemas.plane import Plane
+from schemas.scanning import Scanning
+from schemas.settings import SurfaceSettings
+from schemas.surface import Surface, in_plane_axes
+from tasks.simulation.face import vector
+from tasks.simulation.scan_faults import every_fault
+from tasks.simulation.scene import Scene
+from tasks.simulation.scenes import SCENES
+from tasks.surfaces.cloud import Cloud
+from tasks.surfaces.extraction import Extraction, extract_structure
+from tasks.surfaces.naming import middle_m
+from tasks.surfaces.patches import patches
+from tasks.surfaces.plane_fit import fit_plane
+from tasks.surfaces.voxels import voxelise
+from tests.benchmarks.merged_scans import MergedScans, merged_scans
+from tests.benchmarks.surface_score import Truth, obstacles_found, score_surfaces
+
+Floats = npt.NDArray[np.float64]
+Row = dict[str, Any]
+SEEDS, NAME_SEEDS = range(1, 6), range(1, 11)
+PEER_SEEDS = range(1, 2)  # segment_plane takes minutes
+MOVED_M = 0.5
+SETTINGS = SurfaceSettings()
+PEER_PLANES, PEER_ITERATIONS, PEER_FEWEST = 80, 1000, 100
+THINGS = {
+    "bridge": ("lamp", "car", "rail", "trunk", "leaf"),
+    "arch": ("bench", "bollard", "sign", "rail", "trunk", "leaf"),
+    "facade": ("car0", "car1", "lamp0", "lamp1", "bin", "bench", "cable", "trunk", "leaf"),
+}
+CABLES = {"arch": "rail-cable", "facade": "cable"}
+FEWEST_ON_CABLE, LARGE_M = 50, 0.3
+BARS = {"bridge": 0.90, "arch": 0.85, "facade": 0.85}
+
+
+@dataclass(frozen=True)
+class Case:
+    scene: Scene
+    truth: Truth
+    scans: MergedScans
+
+
+def rows() -> Iterator[Row]:
+    """All rows, as DESIGN.md's benchmarks have them."""
+    for name in SCENES:
+        if name in BARS:
+            yield from _structure(name)
+    yield from _faults()
+    yield from _growth()
+    yield from _names()
+
+
+def site(name: str, seed: int, moved_m: float = MOVED_M) -> Scene:
+    """The scene with its stations moved by up to `moved_m`, otherwise for each seed."""
+    scene = SCENES[name](seed)
+    rng = np.random.default_rng([seed, 0x53697465])
+    off = rng.uniform(-moved_m, moved_m, (len(scene.stations_m), 3)) * (1, 1, 0.2)
+    return replace(scene, stations_m=tuple(vector(p) for p in np.asarray(scene.stations_m) + off))
+
+
+def _case(name: str, seed: int, scanning: Scanning) -> Case:
+    scene = site(name, seed)
+    return Case(scene, Truth.of(scene, scanning.step_deg), merged_scans(scene, scanning))
+
+
+def _extracted(cloud: Cloud) -> tuple[Extraction, float]:
+    began = time.process_time()
+    return extract_structure(cloud, SETTINGS, "benchmark", lambda f: None), time.process_time() - began
+
+
+def _row(what: str, values: Sequence[float], unit: str, bar: str | None, data: str, **peer: Any) -> Row:
+    """The median over the seeds against a bar such as "≤ 3"."""
+    value = float(np.median(values))
+    holds = None
+    if bar is not None:
+        sign, limit = bar.split()
+        holds = value <= float(limit) if sign == "≤" else value >= float(limit)
+    named = {"peer": None, "peer_value": None} | peer
+    return (
+        {"what": what, "value": round(value, 4), "unit": unit, "bar": bar, "holds": holds}
+        | named
+        | {
+            "data": data,
+            "seed": f"{len(values)} seeds",
+        }
+    )
+
+
+def _structure(name: str) -> Iterator[Row]:
+    recall, precision, normal, offset, seconds, coverage, deviation = ([] for _ in range(7))
+    large, on_cables, kept_cables = 0, 0, 0
+    found_large = 0
+    peers: dict[str, list[tuple[float, float, float]]] = {"segment_plane": [], "detect_planar_patches": []}
+    for seed in SEEDS:
+        case = _case(name, seed, Scanning())
+        extraction, cpu = _extracted(case.scans.cloud)
+        score = score_surfaces(extraction.surfaces, case.truth)
+        recall.append(score.recall)
+        precision.append(score.precision)
+        normal.append(float(np.quantile(score.normal_deg, 0.95)))
+        offset.append(float(np.quantile(score.offset_m, 0.95)) * 1000)
+        seconds.append(cpu)
+        if len(score.coverage):
+            coverage.append(float(score.coverage.min()))
+            deviation.append(score.deviation_m * 1000)
+        points = case.scans.cloud.points
+        things = _things(case.scene, THINGS[name], case.scans, smallest_m=LARGE_M)
+        found = obstacles_found(extraction.obstacles, extraction.surfaces, points, things)
+        large, found_large = large + len(found), found_large + sum(found)
+        if name in CABLES:
+            cable = _things(case.scene, (CABLES[name],), case.scans, smallest_m=0.0)
+            cable = [own for own in cable if len(own) >= FEWEST_ON_CABLE]
+            kept = obstacles_found(extraction.obstacles, (), points, cable)
+            on_cables, kept_cables = on_cables + len(kept), kept_cables + sum(kept)
+        if seed in PEER_SEEDS:
+            for peer, planes in (
+                ("segment_plane", segment_planes),
+                ("detect_planar_patches", planar_patches),
+            ):
+                found_by_peer, peer_cpu = planes(case.scans.cloud)
+                peer_score = score_surfaces(found_by_peer, case.truth)
+                peers[peer].append((peer_score.recall, peer_score.precision, cpu / peer_cpu))
+    data = f"simulated {name}, scanned from {len(case.scene.stations_m)} stations"
+    for peer, scores in peers.items():
+        theirs = np.median(np.array(scores), axis=0)
+        label = f"Open3D {peer}"
+        bar = f"≥ {BARS[name]}"
+        yield _row(
+            f"{name}: recall of surfaces", recall, "1", bar, data, peer=label, peer_value=round(theirs[0], 3)
+        )
+        yield _row(
+            f"{name}: precision of surfaces",
+            precision,
+            "1",
+            bar,
+            data,
+            peer=label,
+            peer_value=round(theirs[1], 3),
+        )
+        eighth = "≤ 0.125" if name == "bridge" and peer == "segment_plane" else None
+        ratios = [ratio for _, _, ratio in scores]
+        yield _row(
+            f"{name}: CPU time, ratio to the peer's", ratios, "1", eighth, data, peer=label, peer_value=1.0
+        )
+    limits = ("≤ 0.1", "≤ 3") if name == "bridge" else (None, None)
+    yield _row(f"{name}: normals, 95th percentile", normal, "°", limits[0], data)
+    yield _row(f"{name}: offsets, 95th percentile", offset, "mm", limits[1], data)
+    yield _row(f"{name}: CPU time", seconds, "s", None, data)
+    if coverage:
+        yield _row(f"{name}: least covered curved part", coverage, "1", "≥ 0.85", data)
+        limit = 1000 * SETTINGS.distance_m
+        yield _row(f"{name}: strips' deviation from the curve, 95 %", deviation, "mm", f"≤ {limit:g}", data)
+    yield _row(
+        f"{name}: obstacles ≥ {LARGE_M} m found", [found_large / large], "1", "≥ 1", f"{data}; {large} things"
+    )
+    if on_cables:
+        yield _row(
+            f"{name}: 20 mm cables kept", [kept_cables / on_cables], "1", "≥ 1", f"{data}; {on_cables} cables"
+        )
+
+
+def _faults() -> Iterator[Row]:
+    for name, bar in BARS.items():
+        scores = []
+        for seed in SEEDS:
+            case = _case(name, seed, every_fault(seed))
+            scores.append(score_surfaces(_extracted(case.scans.cloud)[0].surfaces, case.truth))
+        data = f"simulated {name}, every fault of the scanner on"
+        yield _row(f"{name}, faults: recall of surfaces", [s.recall for s in scores], "1", f"≥ {bar}", data)
+        yield _row(
+            f"{name}, faults: precision of surfaces", [s.precision for s in scores], "1", f"≥ {bar}", data
+        )
+
+
+def _growth() -> Iterator[Row]:
+    """CPU time over points: as the site grows (bridges in a row), and as it is scanned more finely."""
+    bridge = merged_scans(site("bridge", 1), Scanning(step_deg=0.72)).cloud
+    side_m = float(np.ptp(bridge.points[:, 0])) + 5.0
+    in_a_row = []
+    for count in (1, 2, 4, 8):
+        moved = [bridge.points + np.array([k * side_m, 0.0, 0.0]) for k in range(count)]
+        parts = [
+            np.concatenate(moved),
+            np.tile(bridge.normals, (count, 1)),
+            np.tile(bridge.views, (count, 1)),
+        ]
+        in_a_row.append(Cloud(*parts))
+    finer = [merged_scans(site("bridge", 1), Scanning(step_deg=s)).cloud for s in (1.0, 0.7, 0.5, 0.35)]
+    for what, clouds in (("a larger site", in_a_row), ("a denser scan", finer)):
+        _extracted(clouds[0])  # compiled once
+        sizes, seconds = [len(c) for c in clouds], [_extracted(c)[1] for c in clouds]
+        exponent = float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])
+        data = "simulated bridge, " + ", ".join(f"{n / 1000:.0f}k" for n in sizes) + " points"
+        yield _row(f"surfaces: CPU time's exponent in points, {what}", [exponent], "1", "≤ 1.15", data) | {
+            "seed": 1
+        }
+
+
+def _names() -> Iterator[Row]:
+    """How many surfaces bear the same name in other scans of the bridge."""
+    runs = [
+        _extracted(merged_scans(site("bridge", seed, 0.0), Scanning()).cloud)[0].surfaces
+        for seed in NAME_SEEDS
+    ]
+    for what, least_m2 in (("surfaces of 2 m² and more", 2.0), ("all surfaces", 0.0)):
+        same = [_same_names(runs[0], other, least_m2) for other in runs[1:]]
+        bar = "≥ 1" if least_m2 else None
+        yield _row(
+            f"bridge: names kept in another scan, {what}", same, "1", bar, f"{len(runs)} scans of the bridge"
+        )
+
+
+def _same_names(one: Sequence[Surface], other: Sequence[Surface], least_m2: float) -> float:
+    """Of surfaces within half a metre and 8° of each other in two runs, the share that are called alike."""
+    middles = np.array([middle_m(s) for s in other])
+    normals = np.array([s.plane.normal for s in other])
+    kept = []
+    for surface in one:
+        if surface.name.startswith("ground") or surface.area_m2 < least_m2:
+            continue
+        away = np.linalg.norm(middles - middle_m(surface), axis=1)
+        away[normals @ np.asarray(surface.plane.normal) < np.cos(np.radians(8))] = np.inf
+        if away.min() < 0.5:
+            kept.append(other[int(away.argmin())].name == surface.name)
+    return float(np.mean(kept))
+
+
+def _things(
+    scene: Scene, prefixes: Sequence[str], scans: MergedScans, smallest_m: float
+) -> list[npt.NDArray[np.int64]]:
+    """Indices of the points of each thing that was scanned at all and is large enough; a tree's leaves are
+    one thing, a row of rail posts several."""
+    groups: dict[str, list[int]] = {}
+    for number, face in enumerate(scene.faces):
+        prefix = next((p for p in prefixes if face.name.startswith(p)), None)
+        if prefix is not None:
+            single = prefix == "rail"
+            groups.setdefault(face.name.rpartition("-")[0] if single else prefix, []).append(number)
+    found = []
+    for numbers in groups.values():
+        own = np.flatnonzero(np.isin(scans.face, numbers))
+        if len(own) >= 10 and np.ptp(scans.cloud.points[own], axis=0).max() >= smallest_m:
+            found.append(own)
+    return found
+
+
+def segment_planes(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
+    """Open3D's segment_plane, again and again on what is left of the cloud at equal density; and its CPU
+    seconds."""
+    equal, _ = voxelise(cloud, SETTINGS.voxel_m or 0.05)
+    rest = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(equal.points))
+    index = np.arange(len(equal))
+    planes = []
+    o3d.utility.random.seed(0)
+    began = time.process_time()
+    while len(planes) < PEER_PLANES and len(index) > PEER_FEWEST:
+        _, inliers = rest.segment_plane(SETTINGS.distance_m, 3, PEER_ITERATIONS)
+        if len(inliers) < PEER_FEWEST:
+            break
+        planes.append(index[inliers])
+        index = np.delete(index, inliers)
+        rest = rest.select_by_index(inliers, invert=True)
+    seconds = time.process_time() - began
+    found = []
+    for own in planes:
+        facing = fit_plane(equal.points[own], np.array([0.0, 0.0, 1.0]))[1]
+        for sign in (1.0, -1.0):
+            side = own[equal.views[own] @ (sign * facing) > 0]
+            found += patches(equal.points, side, sign * facing, 0.08, 0.35, SETTINGS.min_area_m2)
+    return tuple(patch.surface for patch in found), seconds
+
+
+def planar_patches(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
+    """Open3D's detect_planar_patches with its documented settings, and its CPU seconds."""
+    equal, _ = voxelise(cloud, SETTINGS.voxel_m or 0.05)
+    whole = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(equal.points))
+    whole.normals = o3d.utility.Vector3dVector(equal.normals)
+    began = time.process_time()
+    boxes = whole.detect_planar_patches(
+        normal_variance_threshold_deg=60,
+        coplanarity_deg=75,
+        outlier_ratio=0.75,
+        min_plane_edge_length=0.0,
+        min_num_points=0,
+        search_param=o3d.geometry.KDTreeSearchParamKNN(knn=30),
+    )
+    seconds = time.process_time() - began
+    found = []
+    for box in boxes:
+        thin = int(np.argmin(box.extent))
+        wide = [k for k in range(3) if k != thin]
+        normal = np.asarray(box.R)[:, thin]
+        moved = (equal.points - box.center) @ np.asarray(box.R)
+        inside = (np.abs(moved) <= np.asarray(box.extent) / 2 + 0.02).all(axis=1)
+        if (equal.views[inside] @ normal).sum() < 0:
+            normal = -normal
+        u, v = in_plane_axes(normal)
+        sides = np.asarray(box.R)[:, wide] * (np.asarray(box.extent)[wide] / 2)
+        corners = [sides @ s for s in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        ring = tuple((float(c @ u), float(c @ v)) for c in corners)
+        area_m2 = float(np.prod(np.asarray(box.extent)[wide]))
+        if area_m2 >= SETTINGS.min_area_m2:
+            found.append(
+                Surface(
+                    name="patch",
+                    plane=Plane.through(box.center, normal),
+                    origin_m=vector(box.center),
+                    u=u,
+                    v=v,
+                    outline_m=ring,
+                    hull_m=ring,
+                    area_m2=area_m2,
+                )
+            )
+    return tuple(found), seconds
