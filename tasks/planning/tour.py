@@ -2,7 +2,7 @@
 
 The paper leaves the order open. Rows flown to and fro (boustrophedon) and nearest neighbour give the starts;
 2-opt (reverse a stretch) and Or-opt (move up to three neighbours elsewhere) improve both until neither helps.
-Then the better one is kicked out of its local optimum again and again (iterated local search): a double bridge
+Then the better one is kicked out of its local optimum over and over (iterated local search): a double bridge
 among neighbouring stops, 2-opt and Or-opt around it, kept where the tour got no longer. The kicks are seeded.
 """
 
