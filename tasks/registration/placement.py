@@ -20,6 +20,7 @@ from tasks.registration.yaw_search import DistanceField, turns, turns_about
 
 LEAST_STABILITY = 0.002  # of the overlap's normals; a floor alone has less
 MOST_SEEN_THROUGH = 0.13  # see visibility.contradiction
+MOST_AS_STATED = 0.3  # where it came to stand as it was measured: traffic between scans, not a wrong place
 SURELY_RIGHT = 0.03  # no better proposal is looked for
 PROPOSALS = 4  # of each kind that are tried
 MOTIONS = 40  # by plan or features, before the least contradictory are chosen
@@ -93,7 +94,8 @@ class _Growing:
             if found.share < self.min_overlap or found.stability < LEAST_STABILITY:
                 continue
             seen_through = self._contradiction(candidate, T)
-            if seen_through < MOST_SEEN_THROUGH and (best is None or seen_through < best[0]):
+            most = MOST_AS_STATED if stated and self._as_stated(candidate, T) else MOST_SEEN_THROUGH
+            if seen_through < most and (best is None or seen_through < best[0]):
                 best = seen_through, T
             if seen_through < SURELY_RIGHT:
                 break
@@ -167,21 +169,22 @@ class _Growing:
         return sorted(motions, key=lambda T: self._contradiction(candidate, T))[: 2 * PROPOSALS]
 
     def _contradiction(self, candidate: int, T: Array) -> float:
-        """The worst with any placed station."""
+        """With all placed stations together: people and cars weigh little in what many saw."""
         shape = self.shapes[candidate]
-        worst = 0.0
+        sights = []
         for other, T_other in self.T.items():
             T_other_candidate = inverse(T_other) @ T
-            seen = visibility.contradiction(
-                shape.cloud,
-                self.shapes[other].cloud,
-                shape.image,
-                self.shapes[other].image,
-                T_other_candidate,
-                inverse(T_other_candidate),
+            sights.append(
+                visibility.sight(
+                    shape.cloud,
+                    self.shapes[other].cloud,
+                    shape.image,
+                    self.shapes[other].image,
+                    T_other_candidate,
+                    inverse(T_other_candidate),
+                )
             )
-            worst = max(worst, seen)
-        return worst
+        return visibility.contradiction(sights)
 
     def _frame_of_world(self) -> Array | None:
         """Where the world of the statements lies in the component's frame, once that is known."""

@@ -1,5 +1,6 @@
 """What a scanner saw through is empty: points of another scan that stand there say the alignment is wrong."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,19 +63,18 @@ def range_image(cloud: Cloud, scanner_m: Array | None) -> RangeImage | None:
     )
 
 
-def contradiction(
+def sight(
     first: Cloud,
     second: Cloud,
     first_image: RangeImage | None,
     second_image: RangeImage | None,
     T_second_first: Array,
     T_first_second: Array,
-) -> float:
-    """Share of what stands in the other scanner's sight that this scanner saw through; 0 where unknown.
+) -> tuple[float, float]:
+    """How much of what stands in the other scanner's sight that one saw through, and how much it met.
 
     All facings weigh alike, else the ground, which agrees with any ground, would hide the contradictions
-    of the rest. True alignments of still scenes have 0.00, of streets and rooms up to 0.08; wrong ones of
-    look-alike bridges 0.17 and more.
+    of the rest.
     """
     through = met = 0.0
     for cloud, image, T in ((first, second_image, T_second_first), (second, first_image, T_first_second)):
@@ -85,6 +85,16 @@ def contradiction(
         passed, ended = image.judge(transform(T, cloud.points_m))
         through += float(weights[face[passed]].sum())
         met += float(weights[face[ended]].sum())
+    return through, met
+
+
+def contradiction(sights: Sequence[tuple[float, float]]) -> float:
+    """Share of all that was in sight that was seen through; 0 where too little was.
+
+    True alignments of still scenes have 0.00, of streets and rooms up to 0.08; wrong ones of look-alike
+    bridges 0.17 and more.
+    """
+    through, met = sum(t for t, _ in sights), sum(m for _, m in sights)
     return through / (through + met) if through + met > ENOUGH else 0.0
 
 
