@@ -18,6 +18,7 @@ class Photo(Contract):
     surface: str  # the surface (or set) it belongs to
     sharpness: float  # variance of the Laplacian over that of local contrast, dimensionless; blur lowers it
     exposure: float  # mean grey, 0..1
+    metered_ev: float | None = None  # log2 of s · ISO / 100 / f-number², from EXIF: the light it was set for
     orientation: int = 1  # EXIF orientation, already undone in `file` and `camera`
 
 

@@ -9,6 +9,7 @@ from PIL import Image
 from schemas.contract import Vector3
 
 _EXIF_IFD, _GPS_IFD = 0x8769, 0x8825
+_EXPOSURE_S, _ISO, _F_NUMBER = 0x829A, 0x8827, 0x829D
 _FOCAL_MM, _FOCAL_35MM, _PLANE_X_RESOLUTION, _PLANE_UNIT = 0x920A, 0xA405, 0xA20E, 0xA210
 _MM_PER_UNIT = {2: 25.4, 3: 10.0, 4: 1.0}
 
@@ -21,6 +22,7 @@ class Metadata:
     calibrated_focal_px: float | None  # DJI's own calibration
     gps: Vector3 | None  # latitude, longitude (degrees), altitude above take-off (m; 0: not known)
     view_deg: Vector3 | None  # yaw, pitch, roll of the gimbal
+    metered_ev: float | None  # log2 of exposure time (s) · ISO / 100 / f-number²
 
 
 def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
@@ -37,7 +39,18 @@ def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
         calibrated_focal_px=_positive(_xmp(xmp, "CalibratedFocalLength")),
         gps=_gps(_ifd(exif, _GPS_IFD), _xmp(xmp, "RelativeAltitude")),
         view_deg=None if yaw is None or pitch is None else _view(yaw, pitch, roll or 0.0),
+        metered_ev=_metered_ev(camera),
     )
+
+
+def _metered_ev(camera: dict[int, object]) -> float | None:
+    """None where any of the three is missing: a factor of unknown size would be worse than none."""
+    iso = camera.get(_ISO)
+    seconds, f_number = _positive(camera.get(_EXPOSURE_S)), _positive(camera.get(_F_NUMBER))
+    speed = _positive(iso[0] if isinstance(iso, tuple) and iso else iso)
+    if seconds is None or speed is None or f_number is None:
+        return None
+    return math.log2(seconds * speed / 100.0 / f_number**2)
 
 
 def _view(yaw: float, pitch: float, roll: float) -> Vector3 | None:

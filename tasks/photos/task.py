@@ -56,6 +56,7 @@ def ingest(
         sharpness=sharpness(decoded.pixels),
         exposure=exposure(decoded.pixels),
         orientation=decoded.orientation,
+        metered_ev=metadata.metered_ev,
     )
 
 

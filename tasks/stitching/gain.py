@@ -22,7 +22,9 @@ Floats = npt.NDArray[np.float32]
 
 SHRINK = 8  # photos are averaged over squares of so many pixels before they are compared
 SAMPLES = 24  # a side of the grid laid over each photo
-SIGMA_GAIN = 0.3  # 1σ of a photo's log exposure; binds only what overlaps nothing
+SIGMA_GAIN = 1.0  # 1σ of a photo's log exposure; binds only what overlaps nothing
+SIGMA_METERED = 0.05  # and of what it differs from what the camera says it set
+SIGMA_PAIR = 0.02  # of the log ratio of two photos, all samples alike: surfaces shine, air scatters
 SIGMA_FALLOFF = 0.5  # 1σ of the log of a lens's falloff in the corner, each of its two terms
 SIGMA_BALANCE = 0.05  # 1σ of the log of red and blue against green
 SOFT = 0.01  # log ratios that differ by more count by their absolute value
@@ -75,9 +77,11 @@ def solve_light(
     views: Sequence[View],
     read: Callable[[int], Pixels],
     pairs: Sequence[tuple[int, int]],
+    metered_ev: Sequence[float | None],
     on_progress: Callable[[float], None],
 ) -> Light:
-    """`read(i)` gives photo i as RGB; one at a time."""
+    """`read(i)` gives photo i as RGB; one at a time. metered_ev: exposures as the camera set them, which
+    keep gains from drifting along the mosaic; None where it does not say."""
     count = len(views)
     small = []
     for i in range(count):
@@ -104,26 +108,32 @@ def solve_light(
     design = csr_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(len(a), size)
     )
-    prior = np.r_[np.full(count, SIGMA_GAIN), np.full(size - count, SIGMA_FALLOFF)]
-    green = _least_absolute(design, -ratio[:, 1], prior)
+    told = np.array([0.0 if ev is None else -ev * np.log(2.0) for ev in metered_ev])
+    sigma = np.array([SIGMA_GAIN if ev is None else SIGMA_METERED for ev in metered_ev])
+    known = sigma == SIGMA_METERED
+    told[known] -= told[known].mean() if known.any() else 0.0
+    weight = np.concatenate([np.full(len(s.ratio), SIGMA_PAIR**-2.0 / len(s.ratio)) for s in samples])
+    sigma = np.r_[sigma, np.full(size - count, SIGMA_FALLOFF)]
+    told = np.r_[told, np.zeros(size - count)]
+    green = _least_absolute(design, -ratio[:, 1], weight, told, sigma)
     exposures = design[:, :count].tocsr()
-    balance = np.full(count, SIGMA_BALANCE)
+    none, balance = np.zeros(count), np.full(count, SIGMA_BALANCE)
     logs = [green[:count]] * 3
     for c in (0, 2):
-        logs[c] = green[:count] + _least_absolute(exposures, ratio[:, 1] - ratio[:, c], balance)
+        logs[c] = green[:count] + _least_absolute(exposures, ratio[:, 1] - ratio[:, c], weight, none, balance)
     gains = np.stack(logs, axis=1)
     falloff = green[count:].reshape(-1, TERMS)[camera_of]
     return Light(np.asarray(np.exp(gains - gains.mean(axis=0))), falloff)
 
 
-def _least_absolute(design: csr_matrix, measured: Array, sigma: Array) -> Array:
-    """x of design · x = measured with the least sum of absolute differences beyond SOFT."""
+def _least_absolute(design: csr_matrix, measured: Array, weight: Array, told: Array, sigma: Array) -> Array:
+    """x of design · x = measured with the least sum of absolute differences beyond SOFT; x = told ± sigma."""
     robust = np.ones(len(measured))
     x = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
-        weighted = design.multiply((robust / SOFT**2)[:, None]).tocsr()
+        weighted = design.multiply((robust * weight)[:, None]).tocsr()
         A = (design.T @ weighted).toarray() + np.diag(sigma**-2.0)
-        x = solve_positive(A, weighted.T @ measured)
+        x = solve_positive(A, weighted.T @ measured + told / sigma**2)
         robust = 1.0 / np.maximum(np.abs(design @ x - measured) / SOFT, 1.0)
     return x
 

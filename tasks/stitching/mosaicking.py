@@ -89,7 +89,13 @@ def blend_photos(
     position = {i: k for k, i in enumerate(shown)}
     views = [view for i in shown if (view := registered.fates[i].view) is not None]
     pairs = [(position[a], position[b]) for a, b in registered.pairs]
-    light = solve_light(views, lambda k: read(shown[k]), pairs, lambda f: on_progress(0.3 * f))
+    light = solve_light(
+        views,
+        lambda k: read(shown[k]),
+        pairs,
+        [registered.photos[i].metered_ev for i in shown],
+        lambda f: on_progress(0.3 * f),
+    )
     every = np.ones(len(registered.photos))
     every[shown] = light.gains[:, 1]
     tiles = composite(
