@@ -13,7 +13,7 @@ from tasks.registration.cloud_shelf import Shelf
 from tasks.registration.icp import align
 from tasks.registration.merged_model import merge
 from tasks.registration.overlap import overlapping
-from tasks.registration.pose_graph import Edge, optimise, spanning_start
+from tasks.registration.pose_graph import Edge, covariances, optimise, spanning_start
 from tasks.registration.read_scan import read_scan
 from tasks.registration.rigid_motion import (
     Array,
@@ -144,6 +144,33 @@ def test_pose_graph_without_error_stays(tmp_path: Path) -> None:
     found, apart_m = optimise(spanning_start(5, edges), edges)
     assert all(np.allclose(f, t, atol=1e-9) for f, t in zip(found, truth, strict=True))
     assert max(apart_m) < 1e-9
+
+
+def test_covariances_say_how_far_poses_are_off() -> None:
+    """Rings of ten with noise in every pair: the mean of d²/6 of all stations over 20 rings is about one."""
+    squares = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        truth = ring(10)
+        truth = [inverse(truth[0]) @ T for T in truth]
+        edges = []
+        for k in range(10):
+            for step in (1, 2, 3):
+                j = (k + step) % 10
+                T = exp(rng.normal(0, [1e-4] * 3 + [1e-3] * 3)) @ inverse(truth[k]) @ truth[j]
+                edges.append(Edge(j, k, T, np.diag([1e5] * 3 + [1e3] * 3), 1000, 0.003))
+        found, _ = optimise(spanning_start(10, edges), edges)
+        places_m = [T[:3, 3] for T in found]
+        tips = np.vstack([np.eye(3), -np.eye(3)]) * 10
+        gauge = fit(
+            np.concatenate([transform(T, tips) for T in found]),
+            np.concatenate([transform(T, tips) for T in truth]),
+        )
+        for T, t, C in zip(found, truth, covariances(found, edges, places_m), strict=True):
+            apart = log(gauge @ T @ inverse(t))
+            error = adjoint(pose(np.eye(3), -t[:3, 3])) @ apart
+            squares.append(float(error @ np.linalg.pinv(C, rcond=1e-9) @ error) / 6)
+    assert 0.7 < np.mean(squares) < 1.5
 
 
 def test_disconnected_pose_graph_is_refused() -> None:

@@ -12,10 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.problem import BadInput
-from tasks.registration.read_scan import READERS, read_scan, scan_count, stated_unit_m
+from tasks.registration.read_scan import READERS, read_scan, scan_blocks, scan_count, stated_unit_m
+from tasks.registration.readers import e57, las, ply, text_rows
+from tasks.registration.readers import pcd as pcd_reader
 from tasks.registration.readers.file_scan import Unreadable
 from tasks.registration.readers.lzf import decompress
 from tests.development_data import development_data
+from tests.registration.mutated_files import mutated_files, outcome
 
 POINTS = np.array([[0.0, 0.0, 1.0], [2.5, -1.25, 0.5], [-3.0, 4.0, 2.0], [1.0, 1.0, 7.5]])
 NORMALS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.6, 0.0, 0.8]])
@@ -277,6 +280,41 @@ def test_real_files_of_every_format(name: str) -> None:
         return
     scans = [read_scan(path, index) for index in range(scan_count(path))]
     assert tuple(len(scan.points_m) for scan in scans) == expected
+
+
+def test_a_hundred_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
+    folder = development_data("scans/formats")
+    files = sorted(path for path in folder.iterdir() if path.name in FORMATS)
+    found = {path.name: outcome(path) for path in mutated_files(files, tmp_path, 100)}
+    assert {name: said for name, said in found.items() if said not in ("read", "refused")} == {}
+    assert {"read", "refused"} == set(found.values())
+
+
+def test_large_scans_come_in_blocks_and_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every format gives the same points whatever the block; UTM's origin is that of all blocks."""
+    for reader in (ply, pcd_reader, e57, las, text_rows):
+        monkeypatch.setattr(reader, "BLOCK", 3)
+    utm = POINTS + np.array([512_345.0, 4_321_987.0, 12.0])
+    header = ply_header("binary_little_endian").encode()
+    las_file = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
+    las_file.header.scales, las_file.header.offsets = np.full(3, 0.0001), utm[0]
+    las_file.x, las_file.y, las_file.z = utm.T
+    las_file.write(tmp_path / "b.las")
+    table = np.zeros(4, dtype=[("xyz", "<f8", 3), ("_", "u1", 4)])
+    table["xyz"] = utm
+    for path in (
+        written(tmp_path, "b.ply", header + utm.astype("<f8").tobytes()),
+        written(tmp_path, "b.xyz", rows(utm)),
+        written(tmp_path, "b.pts", "4\n" + rows(utm)),
+        written(tmp_path, "b.pcd", pcd("binary", table.tobytes(), size=8)),
+        tmp_path / "b.las",
+    ):
+        blocks = list(scan_blocks(path))
+        assert [len(block.points_m) for block in blocks] == [3, 1], path.name
+        assert all(np.array_equal(block.origin_m, blocks[0].origin_m) for block in blocks)
+        assert np.abs(read_scan(path).points_m + blocks[0].origin_m - utm).max() < 1e-4
+    with pytest.raises(BadInput, match="cut short: 9 points"):
+        list(scan_blocks(written(tmp_path, "short.pts", "9\n" + rows(utm))))
 
 
 def test_real_las_states_its_unit() -> None:

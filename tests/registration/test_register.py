@@ -9,11 +9,11 @@ import pytest
 from schemas.problem import BadInput
 from schemas.scan import Scan
 from schemas.settings import RegistrationSettings
-from schemas.target import SiteTarget
+from schemas.target import SeenTarget, SiteTarget
 from tasks.registration.read_scan import read_scan
 from tasks.registration.register import Registration
 from tasks.registration.register import register as register_to
-from tasks.registration.rigid_motion import Array, angle_deg, inverse, yaw
+from tasks.registration.rigid_motion import Array, angle_deg, inverse, transform, yaw
 from tasks.simulation.bridge import bridge
 from tasks.simulation.scanner import scan
 from tests.development_data import development_data
@@ -56,6 +56,14 @@ def test_stations_with_measured_positions(site_folder: Path) -> None:
     assert max(off) < 0.12
     assert all(T[2, 2] > np.cos(np.radians(0.02)) for T in poses(found))
     assert all(p.overlap >= 0.05 and 0.0003 < p.rmse_m < 0.005 for p in found.pairs)
+    for station in found.stations:  # what it says of its own accuracy is of the size of its error
+        C = np.array(station.covariance)
+        assert np.allclose(C, C.T)
+        assert np.linalg.eigvalsh(C).min() > -1e-12
+        assert station.sigma_mm is not None
+        assert 0.05 < station.sigma_mm < 3.0
+        assert station.scanner_m is not None
+        assert np.allclose(station.scanner_m, np.array(station.T_world_scan)[:3, 3])
 
 
 def test_stations_of_which_nothing_is_known(site_folder: Path) -> None:
@@ -116,6 +124,40 @@ def test_large_coordinates_keep_their_millimetres(site_folder: Path) -> None:
     assert np.abs([found.model.low_m, found.model.high_m]).max() < 100
     for f, t in zip(poses(found), true_poses(found), strict=True):
         assert np.linalg.norm(f[:3, 3] - t[:3, 3]) < 0.005
+
+
+def test_a_station_that_does_not_connect_ends_the_run_where_all_are_required(site_folder: Path) -> None:
+    strict = RegistrationSettings(require_all=True)
+    with pytest.raises(BadInput, match="yard: no overlap ties them"):
+        register([*(measured(site_folder, k) for k in (0, 3)), unknown(site_folder, "yard")], strict)
+
+
+def test_targets_tie_the_model_to_the_site_and_judge_it(site_folder: Path) -> None:
+    """Positions to 5 cm are given too, and have no say; the datum is a national grid."""
+    to_grid = yaw(0.4, (512_345.0, 5_432_100.0, 87.0))
+    places = {"C0": (-9, -8, 2), "C1": (9, -7, 1), "C2": (8, 9, 4), "C3": (-8, 8, 1), "K": (0, 2, 3)}
+    surveyed = tuple(
+        SiteTarget(name=n, position_m=triple(transform(to_grid, np.array([p]))[0]), check=n == "K")
+        for n, p in places.items()
+    )
+    given = []
+    for k in (0, 3):
+        scan_of, path = measured(site_folder, k)
+        in_scan = transform(inverse(pose_of(k)), np.array(list(places.values())))
+        seen = tuple(SeenTarget(name=n, position=triple(p)) for n, p in zip(places, in_scan, strict=True))
+        given.append((scan_of.model_copy(update={"targets": seen}), path))
+    found = register(given, SETTINGS, *surveyed)
+    assert not found.left_out
+    assert {(t.name, t.used) for t in found.targets} == {(n, n != "K") for n in places}
+    assert all(np.linalg.norm(t.residual_m) < 0.003 for t in found.targets)
+    for f, t in zip(poses(found), true_poses(found), strict=True):
+        f[:3, 3] += found.origin_m
+        assert np.linalg.norm((f - to_grid @ t)[:3, 3]) < 0.003
+
+
+def triple(p: Array) -> tuple[float, float, float]:
+    x, y, z = p
+    return float(x), float(y), float(z)
 
 
 def test_no_scan_that_can_be_read(tmp_path: Path) -> None:
