@@ -28,17 +28,17 @@ def is_number(token: str) -> bool:
 
 def row_blocks(lines: Iterator[str], columns: Sequence[int], count: int | None = None) -> Iterator[Array]:
     """Blocks of `read_rows`, at most BLOCK rows each; no empty one."""
-    left = count
-    while left is None or left > 0:
-        asked = BLOCK if left is None else min(left, BLOCK)
-        first = next(lines, None)
-        if first is None and left is None:
-            return
-        here = lines if first is None else itertools.chain([first], itertools.islice(lines, asked - 1))
-        rows = read_rows(here, columns, None if left is None else asked)
-        if left is not None:
-            left -= asked
-        yield rows
+    done = 0
+    while count is None or done < count:
+        asked = BLOCK if count is None else min(count - done, BLOCK)
+        rows = read_rows(itertools.islice(lines, asked), columns)
+        done += len(rows)
+        if len(rows):
+            yield rows
+        if len(rows) < asked:
+            break
+    if count is not None and done < count:
+        raise Unreadable(f"it is cut short: {count} points are announced and {done or 'none'} follow")
 
 
 def read_rows(lines: Iterator[str], columns: Sequence[int], count: int | None = None) -> Array:
