@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
 PHOTOS ?= ../shared/data/cracks/uav
-BENCHES := detection scans stitching
+BENCHES := detection planning scans stitching
 
 .PHONY: demo test check bench $(addprefix bench-,$(BENCHES)) train-detector lock clean
 

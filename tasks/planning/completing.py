@@ -24,8 +24,8 @@ Flags = npt.NDArray[np.bool_]
 ENOUGH = 2  # photos that a place should be in
 CLOSER = (1.0, 0.8, 0.64, 0.5)  # shares of the stand-off that are tried for what is missed
 TARGET = 0.975  # share of what can be reached in two photos, in 95 of 100 flights with position errors
-FEW_DRAWS = 100
-AT_ONCE = 2  # photos added between two looks at the flights
+FEW_DRAWS = 60
+AT_ONCE = 2, 0.04  # photos added between two looks at the flights, at least, and as a share
 PHOTO_S = 4.0
 MOST_ASKED = 600  # missed samples of a surface that views are looked for; each stands for its share
 MOST_ADDED = 0.5  # of a surface's photos
@@ -98,6 +98,7 @@ def complete(
             surface, surely, [v.pose for v in different], gsd_mm_px / (1 + error), settings.max_incidence_deg,
             scene, samples,
         )  # fmt: skip
+        at_once = max(AT_ONCE[0], round(AT_ONCE[1] * len(views)))
         least = SMALLEST_GAIN_M2 / samples.cell_m**2
         lacking[~reachable] = 0.0
         views = (*views, *_best(different, shown, lacking, most - len(views), least))
@@ -105,7 +106,7 @@ def complete(
             errs = flown(views)
             if np.quantile(errs.twice, 0.05) >= TARGET:
                 break
-            more = _best(different, shown, errs.lacking * reachable, min(AT_ONCE, most - len(views)), least)
+            more = _best(different, shown, errs.lacking * reachable, min(at_once, most - len(views)), least)
             if not more:
                 break
             views = (*views, *more)

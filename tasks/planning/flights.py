@@ -32,21 +32,16 @@ class TooFar(Exception):
 
 
 class _Home:
-    """Ways and seconds from a shooting point back home, each found once."""
+    """Ways from shooting points back home, each found once."""
 
-    def __init__(self, stops: list[Stop], ways: Ways, vehicle: Vehicle) -> None:
-        self._stops, self._ways, self._vehicle = stops, ways, vehicle
+    def __init__(self, stops: list[Stop], ways: Ways) -> None:
+        self._stops, self._ways = stops, ways
         self._known: dict[int, Array] = {}
 
     def way(self, number: int) -> Array:
         if number not in self._known:
             self._known[number] = self._ways.between(self._stops[number], self._stops[0])
         return self._known[number]
-
-    def seconds(self, number: int, limit_s: float) -> float:
-        """The straight way's, where even that takes longer than the limit."""
-        straight = path_s(np.array([self._stops[number].place_m, self._stops[0].place_m]), self._vehicle)
-        return straight if straight > limit_s else path_s(self.way(number), self._vehicle)
 
 
 def flights(
@@ -57,15 +52,15 @@ def flights(
     Raises TooFar where a battery does not reach a stop and back."""
     usable = vehicle.endurance_s * (1 - vehicle.reserve)
     between = ways.along(stops[1:])
-    home = _Home(stops, ways, vehicle)
+    home = _Home(stops, ways)
     up_and_down = 2 * path_s(np.array([home_m, stops[0].place_m]), vehicle)
     up_and_down += landing_s(float(stops[0].place_m[2]) - home_m[2])
     made = []
     first = 1
     while first < len(stops):
-        seconds = up_and_down + path_s(home.way(first), vehicle) + shooting_s(0.0, 0.0, vehicle, camera)
-        items = ITEMS_AROUND + MOST_ITEMS_A_SHOT + ITEMS_A_CORNER * (len(home.way(first)) - 1)
-        back = home.seconds(first, usable - seconds)
+        back, corners = path_s(home.way(first), vehicle), len(home.way(first)) - 1
+        seconds = up_and_down + back + shooting_s(0.0, 0.0, vehicle, camera)
+        items = ITEMS_AROUND + MOST_ITEMS_A_SHOT + ITEMS_A_CORNER * corners
         if seconds + back > usable:
             raise TooFar(first, seconds + back)
         last = first
@@ -75,9 +70,11 @@ def flights(
             turn = float(turn_s(stops[last].yaw_deg, stops[last + 1].yaw_deg, vehicle))
             longer = seconds + travel + shooting_s(turn, travel, vehicle, camera)
             more = items + MOST_ITEMS_A_SHOT + ITEMS_A_CORNER * (len(path) - 2)
-            if longer + home.seconds(last + 1, usable - longer) > usable:
-                break
-            if more + ITEMS_A_CORNER * (len(home.way(last + 1)) - 1) > MOST_ITEMS:
+            # Back the way it came is a way home; a shorter one is looked for where that is too long.
+            back, corners = travel + back, corners + len(path) - 1
+            if longer + back > usable or more + ITEMS_A_CORNER * corners > MOST_ITEMS:
+                back, corners = path_s(home.way(last + 1), vehicle), len(home.way(last + 1)) - 1
+            if longer + back > usable or more + ITEMS_A_CORNER * corners > MOST_ITEMS:
                 break
             seconds, items, last = longer, more, last + 1
         made.append(

@@ -1,7 +1,7 @@
 """Where the vehicle takes off and lands: a free place on the ground, with a free way up."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -34,13 +34,15 @@ class Base:
     gate: Cell  # the voxel through which the grid is entered from there
     grid: VoxelGrid
     airspace: Airspace
+    _asked: dict[Vector3, Cell | None] = field(default_factory=dict)
 
     def leads_to(self, place_m: Vector3) -> Cell | None:
         """The voxel through which a free place is entered, where a way leads there."""
-        entrance = self.grid.entrance(np.array(place_m), self.airspace)
-        if entrance is None or self.grid.component[entrance] != self.grid.component[self.gate]:
-            return None
-        return entrance
+        if place_m not in self._asked:
+            entrance = self.grid.entrance(np.array(place_m), self.airspace)
+            led = entrance is not None and self.grid.component[entrance] == self.grid.component[self.gate]
+            self._asked[place_m] = entrance if led else None
+        return self._asked[place_m]
 
     def ways_to(self, places_m: Array) -> Flags:
         """(M,) whether a way leads to each of (M, 3) free places, as far as a look around it says."""

@@ -43,8 +43,7 @@ class VoxelGrid:
         if not len(cells):
             return None
         order = np.argsort(((self.centres_m(cells) - place_m) ** 2).sum(axis=1), kind="stable")
-        for start in range(0, len(order), 32):
-            nearest = cells[order[start : start + 32]]
+        for nearest in (cells[order[:3]], *(cells[order[k : k + 32]] for k in range(3, len(order), 32))):
             centres = self.centres_m(nearest)
             free = airspace.segments_free(np.broadcast_to(place_m, centres.shape), centres)
             if free.any():
