@@ -25,8 +25,11 @@ def register(
     unit: Literal["m", "cm", "mm", "ft", "in"] = "m",
     voxel_m: float = 0.02,
     tau_m: float = 0.10,
+    require_all: bool = False,
 ) -> None:
-    """Register laser scans into one model: D/poses.json (T_world_scan, 4×4, metres), D/model.ply.
+    """Register laser scans into one model: D/poses.json, D/model.ply.
+
+    poses.json holds per scan T_world_scan (4×4, metres) and its covariance, per pair overlap and RMSE.
 
     Parameters
     ----------
@@ -40,6 +43,8 @@ def register(
         Point spacing of the merged model, metres.
     tau_m:
         The paper's τ: points closer than this overlap, metres.
+    require_all:
+        Stop where a scan ties to no other. Default: it is named and the others go on.
     """
     from flows.model_structure import METRES
     from flows.results import write_registration
@@ -49,11 +54,14 @@ def register(
 
     with working(out):
         usable, left_out = one_by_one(list(scans), lambda path: ingested_scan(path, METRES[unit]))
-        settings = RegistrationSettings(voxel_m=voxel_m, tau_m=tau_m)
+        settings = RegistrationSettings(voxel_m=voxel_m, tau_m=tau_m, require_all=require_all)
         read: tuple[Scan, ...] = tuple(usable)
         model = register_scans.bare(read, settings)
         write_registration(out, model, copy=True)
-    say(f"{len(model.stations)} scans registered, {model.points:,} points: {out / 'model.ply'}")
+    where = out / "model.ply"
+    say(
+        f"{len(model.stations)} scans registered, {model.points:,} points (files without a unit: {unit}): {where}"
+    )
     warn([*left_out, *model.left_out])
 
 
