@@ -58,10 +58,8 @@ def register(
         read: tuple[Scan, ...] = tuple(usable)
         model = register_scans.bare(read, settings)
         write_registration(out, model, copy=True)
-    where = out / "model.ply"
-    say(
-        f"{len(model.stations)} scans registered, {model.points:,} points (files without a unit: {unit}): {where}"
-    )
+    taken_in = f"files that state no unit taken in {unit}"
+    say(f"{len(model.stations)} scans registered, {taken_in}, {model.points:,} points: {out / 'model.ply'}")
     warn([*left_out, *model.left_out])
 
 
