@@ -29,9 +29,9 @@ from tasks.surfaces.plane_fit import fit_plane
 from tasks.surfaces.voxels import voxelise
 from tests.benchmarks.merged_scans import MergedScans, merged_scans
 from tests.benchmarks.surface_score import Truth, obstacles_found, score_surfaces
+from tests.benchmarks.table import Row, row
 
 Floats = npt.NDArray[np.float64]
-Row = dict[str, Any]
 SEEDS, NAME_SEEDS = range(1, 6), range(1, 11)
 PEER_SEEDS = range(1, 2)  # segment_plane takes minutes
 MOVED_M = 0.5
@@ -83,21 +83,8 @@ def _extracted(cloud: Cloud) -> tuple[Extraction, float]:
 
 
 def _row(what: str, values: Sequence[float], unit: str, bar: str | None, data: str, **peer: Any) -> Row:
-    """The median over the seeds against a bar such as "≤ 3"."""
-    value = float(np.median(values))
-    holds = None
-    if bar is not None:
-        sign, limit = bar.split()
-        holds = value <= float(limit) if sign == "≤" else value >= float(limit)
-    named = {"peer": None, "peer_value": None} | peer
-    return (
-        {"what": what, "value": round(value, 4), "unit": unit, "bar": bar, "holds": holds}
-        | named
-        | {
-            "data": data,
-            "seed": f"{len(values)} seeds",
-        }
-    )
+    """The median over the seeds."""
+    return row(what, float(np.median(values)), unit, bar, data, f"{len(values)} seeds", **peer)
 
 
 def _structure(name: str) -> Iterator[Row]:
