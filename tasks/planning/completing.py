@@ -28,7 +28,7 @@ FEW_DRAWS = 60
 AT_ONCE = 2, 0.04  # photos added between two looks at the flights, at least, and as a share
 PHOTO_S = 4.0
 MOST_ASKED = 600  # missed samples of a surface that views are looked for; each stands for its share
-MOST_ADDED = 0.5  # of a surface's photos
+MOST_ADDED = 1.0  # of a surface's photos
 SMALLEST_GAIN_M2 = 0.02  # a photo for less of the surface is not worth its stop
 NO_WAY = "with no free way there from home"
 

@@ -111,8 +111,8 @@ def simulated(name: str, seed: int) -> tuple[Structure, Array, tuple[str, ...]]:
         (f for f in flat if f.normal[2] < 0.5 and f.name != "ground"), key=lambda f: -f.width_m * f.height_m
     )
     wanted = scene.inspected or tuple(f.name for f in seen[:3])
-    surfaces = [f.surface() for f in scene.faces if f.name in wanted]
-    return structure_of(surfaces, points, scene.stations_m), points, tuple(s.name for s in surfaces)
+    surfaces = [f.surface() for f in scene.faces]
+    return structure_of(surfaces, points, scene.stations_m), points, wanted
 
 
 def _face_points(face: Any) -> Array:
