@@ -184,8 +184,11 @@ def aim(
         if not left.size:
             break
         yaw, pitch, flown = camera_towards(forward[None], right)
-        # Obliquely, a pixel stretches by 1 / cos(incidence): come closer to keep the ground sample distance.
-        positions = targets_m[left] - flown[0] * stand_off_m * np.cos(incidence)
+        # Obliquely, a pixel stretches by 1 / cos(incidence): come closer to keep the ground sample distance,
+        # where the position error has led farther off too.
+        error = vehicle.position_error_m
+        distance = (stand_off_m + error) * np.cos(incidence) - error
+        positions = targets_m[left] - flown[0] * distance
         reasons = _reasons(
             positions, seen_at_m[left], float(pitch[0]), vehicle, airspace, scene, told=incidence == 0.0
         )

@@ -283,7 +283,8 @@ def clearance() -> list[Row]:
             surface = next(s for s in structure.surfaces if s.name == w.surface)
             forward = w.pose.R_world_camera[:, 2]
             cosine = float(-forward @ np.array(surface.plane.normal))
-            asked = farthest[surface.name] * cosine
+            error = vehicle.position_error_m
+            asked = (farthest[surface.name] + error) * cosine - error
             along = float(surface.plane.signed_distance_m(w.position_m)) / cosine
             off.append(abs(along / asked - 1))
     data = "50 scenes, two walls that meet in a corner among 8 boxes"
