@@ -245,6 +245,11 @@ def _things(
     return found
 
 
+def _without_ground(found: Sequence[Surface]) -> tuple[Surface, ...]:
+    """Peers do not say what is ground; every scene's lies at 0, ± its relief."""
+    return tuple(s for s in found if not (s.plane.normal[2] > 0.9 and middle_m(s)[2] < 0.25))
+
+
 def segment_planes(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
     """Open3D's segment_plane, again and again on what is left of the cloud at equal density; and its CPU
     seconds."""
@@ -268,7 +273,7 @@ def segment_planes(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
         for sign in (1.0, -1.0):
             side = own[equal.views[own] @ (sign * facing) > 0]
             found += patches(equal.points, side, sign * facing, 0.08, 0.35, SETTINGS.min_area_m2)
-    return tuple(patch.surface for patch in found), seconds
+    return _without_ground([patch.surface for patch in found]), seconds
 
 
 def planar_patches(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
@@ -313,4 +318,4 @@ def planar_patches(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
                     area_m2=area_m2,
                 )
             )
-    return tuple(found), seconds
+    return _without_ground(found), seconds
