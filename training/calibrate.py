@@ -3,8 +3,8 @@
 On photos of a fold that training left out, and on surfaces it never saw, this fits
 - slope and offset of the logits, so that of the pixels called 70 % seven in ten are crack (Platt 1999), for
   training.export;
-- the weights of a candidate's score (tasks.detection.candidates): its strength and its length against whether
-  most of it lies on a crack that somebody drew;
+- the weights of a candidate's score (tasks.detection.candidates): its strength, length and bend against
+  whether most of it lies on a crack that somebody drew;
 and counts false cracks on the surfaces without any, for each least score. Nothing else is fitted on anything.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.raster import ArrayRaster
-from tasks.detection.candidates import EDGE, STRONGEST, SURE, strength
+from tasks.detection.candidates import EDGE, STRONGEST, SURE, features
 from tasks.detection.components import ELONGATION, components
 from tasks.detection.network import Model, Probability, probability
 from training.photos import by_fold
@@ -76,15 +76,14 @@ def fit_pixels(pairs: list[tuple[Probability, Mask]]) -> Floats:
 
 
 def judged(p: Probability, truth: Mask, least_px: float) -> tuple[Floats, Mask]:
-    """(n, 3) of the long and thin candidates: logit of strength, ln of length, 1; and which are cracks."""
+    """Features of the long and thin candidates, and which of them are cracks."""
     found = components(p >= EDGE)
     which = found.holding(p >= SURE) & (found.extent_px >= least_px) & (found.elongation >= ELONGATION)
     which[0] = False
     reach = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEAR_PX + 1, 2 * NEAR_PX + 1))
     near = cv2.dilate(truth.astype(np.uint8), reach) > 0
     right = np.bincount(found.labels[near], minlength=len(which)) / np.maximum(found.area_px, 1.0)
-    z, length = logit(255.0 * strength(found, p)[which]), np.log(found.extent_px[which])
-    return np.column_stack([z, length, np.ones(int(which.sum()))]), right[which] >= 0.5
+    return features(found, p)[which], right[which] >= 0.5
 
 
 def main(model_path: Path, photos: Path, fold: int, folders: list[Path]) -> None:
@@ -93,10 +92,10 @@ def main(model_path: Path, photos: Path, fold: int, folders: list[Path]) -> None
     of_surfaces = [pair for folder in folders for pair in unseen(model, folder)]
     slope, offset = fit_pixels(of_photos + of_surfaces)
     print(f"logits: slope {slope:.3f}, offset {offset:+.3f} (1 and 0 where they are calibrated already)")
-    features, truths = zip(*(judged(p, truth, LEAST_PX) for p, truth in of_photos + of_surfaces), strict=True)
-    x, y = np.vstack(features), np.concatenate(truths)
+    seen, truths = zip(*(judged(p, truth, LEAST_PX) for p, truth in of_photos + of_surfaces), strict=True)
+    x, y = np.vstack(seen), np.concatenate(truths)
     w = logistic(x, y, np.ones(len(y)), decay=0.1)
-    print(f"{len(y)} candidates, {y.sum()} cracks: STRENGTH, LENGTH, OFFSET = {w.round(3).tolist()}")
+    print(f"{len(y)} candidates, {y.sum()} cracks: WEIGHTS = {w.round(3).tolist()}")
     score = 1.0 / (1.0 + np.exp(-(x @ w)))
     for low, high in ((0.0, 0.2), (0.2, 0.4), (0.4, 0.6), (0.6, 0.8), (0.8, 1.0)):
         inside = (score >= low) & (score <= high)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from skimage.morphology import skeletonize
 
 SIDE_PX = 160
-ON_CRACK = 0.7  # share of the crops of a photo with a crack that are centred on it
+ON_CRACK = 0.5  # share of the crops of a photo with a crack that are centred on it
 FOLDS = 5
 
 Pixels = npt.NDArray[np.uint8]

@@ -3,7 +3,7 @@
 PHOTOS holds images/, masks/ and groups.txt, SURFACES what training.surfaces wrote. With --fold the photos of
 that fold (by group) are left out and judged along the way; without, all take part. Half of each batch is
 photos, half surfaces. One thread and a seed: the same result on the same machine. --start goes on from
-weights that an earlier call wrote, with a rate that starts anew (Loshchilov & Hutter 2017).
+weights that an earlier call wrote, with a rate (--rate) that starts anew (Loshchilov & Hutter 2017).
 """
 
 import argparse
@@ -36,7 +36,7 @@ def loss_of(logit: Tensor, truth: Tensor) -> Tensor:
     p = torch.sigmoid(logit)
     dice = 1.0 - (2.0 * (p * crack).sum() + 1.0) / (p.sum() + crack.sum() + 1.0)
     missed = 1.0 - ((p * line).sum() + 1.0) / (line.sum() + 1.0)
-    return 3.0 * entropy + 0.5 * dice + 0.25 * missed
+    return 4.0 * entropy + 0.3 * dice + 0.1 * missed
 
 
 def batch(photos: list[Photo], surfaces: list[Photo], seed: int) -> tuple[Tensor, Tensor]:
@@ -82,6 +82,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--start", type=Path)
+    parser.add_argument("--rate", type=float, default=RATE)
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
@@ -105,7 +106,7 @@ def main() -> None:
         for step in range(1, args.steps + 1):
             rgb, truth = coming.result()
             coming = ahead.submit(batch, photos, surfaces, (args.seed << 32) + step)
-            rate = RATE * min(step / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / args.steps))
+            rate = args.rate * min(step / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / args.steps))
             for group in optimiser.param_groups:
                 group["lr"] = rate
             with torch.autocast("cpu", torch.bfloat16):

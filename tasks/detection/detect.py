@@ -59,7 +59,7 @@ def detect_raster(
 ) -> DetectionArrays:
     """Cracks of an image of any size, read piece by piece."""
     least_px = settings.min_length_px if gsd_mm_px is None else settings.min_length_mm / gsd_mm_px
-    if settings.method == "onnx":
+    if settings.method in ("hairline", "onnx"):
         return _by_network(raster, model or our_model(), settings.min_score, least_px, on_progress)
     window = (settings.window_px or WINDOW_PX) | 1
     if settings.method == "paper":

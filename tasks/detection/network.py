@@ -17,11 +17,11 @@ from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
 from tasks.detection.sauvola import Mask
 
-DATA_FILES = ()
+DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
-SHA256 = "0" * 64
+SHA256 = "030662d23614c4284c81831a6cde29fa5bf7563f26b42823b31303741192718f"
 STRIDE = 16
-TILE_PX = 1024
+TILE_PX = 2048
 HALO_PX = 96  # what lies further away changes a probability by 3/255 at most (measured)
 FILL_PX = 63  # what is not known is filled from this far around
 

@@ -1,7 +1,8 @@
+import cv2
 import numpy as np
 import pytest
 
-from tasks.detection.candidates import EDGE, SURE, candidates, score_of, strength
+from tasks.detection.candidates import EDGE, SURE, candidates, features, strength
 from tasks.detection.components import components
 
 
@@ -26,11 +27,24 @@ def test_a_candidate_needs_a_pixel_that_is_sure() -> None:
     assert candidates(np.zeros((5, 5), np.uint8)).score.tolist() == [0.0]
 
 
-def test_stronger_and_longer_is_likelier() -> None:
-    core, extent = np.linspace(0.5, 1.0, 20), np.geomspace(30, 3000, 20)
-    assert (np.diff(score_of(core, np.full(20, 80.0))) >= 0).all()
-    assert (np.diff(score_of(np.full(20, 0.8), extent)) >= 0).all()
-    assert 0.0 < score_of(np.array([0.0]), np.array([1.0]))[0] < score_of(core[-1:], extent[-1:])[0] < 1.0
+def test_stronger_is_likelier_and_so_is_longer() -> None:
+    faint, strong, long = (
+        candidates(line((level,), n)).score[1] for level, n in ((190, 40), (250, 40), (250, 80))
+    )
+    assert 0.0 < faint < strong <= long < 1.0
+
+
+def test_bend_is_least_for_a_ruled_line_and_none_for_a_ring() -> None:
+    p = np.zeros((200, 300), np.uint8)
+    cv2.line(p, (10, 20), (290, 60), 250, 3)
+    wave = np.column_stack([np.arange(10, 290), 120 + 15 * np.sin(np.arange(280) / 30)])
+    cv2.polylines(p, [np.rint(wave).astype(np.int32)], False, 250, 3)
+    cv2.circle(p, (150, 175), 18, 250, 2)
+    found = components(p >= EDGE)
+    of_line, of_wave, of_ring = (
+        features(found, p)[found.labels[y, x], 2] for x, y in ((10, 20), (10, 120), (168, 175))
+    )
+    assert of_line < -4.0 < of_wave < -1.0 < of_ring <= 0.0
 
 
 def test_a_score_says_where() -> None:

@@ -9,7 +9,7 @@ from tasks.detection import bands
 from tasks.detection.detect import baselines, detect_image, detect_raster
 from tests.measurement.drawn_crack import drawn_crack
 
-HAIRLINE, PAPER = DetectSettings(), DetectSettings(method="paper")
+RIDGE, PAPER = DetectSettings(method="ridge"), DetectSettings(method="paper")
 
 
 def rough(height: int, width: int, grey: float = 150.0, contrast: float = 0.05, seed: int = 0) -> np.ndarray:
@@ -54,7 +54,7 @@ def false_px(found: np.ndarray, truth: np.ndarray) -> int:
 def test_finds_a_crack_and_nothing_else(width: int, depth: float) -> None:
     rgb = rough(300, 700, contrast=0.03)
     truth = with_crack(rgb, 150, width, depth, 60, 640)
-    found = detect_image(rgb, None, HAIRLINE, 1.0).mask
+    found = detect_image(rgb, None, RIDGE, 1.0).mask
     assert found_share(found, truth) > 0.9
     assert false_px(found, truth) == 0
 
@@ -62,7 +62,7 @@ def test_finds_a_crack_and_nothing_else(width: int, depth: float) -> None:
 def test_rough_concrete_without_cracks_is_left_alone() -> None:
     for seed in range(4):
         rgb = rough(1000, 1000, contrast=0.06, seed=seed)
-        assert not detect_image(rgb, None, HAIRLINE, 1.0).mask.any()
+        assert not detect_image(rgb, None, RIDGE, 1.0).mask.any()
 
 
 def test_holes_stains_and_a_shadows_edge_are_no_cracks() -> None:
@@ -75,14 +75,14 @@ def test_holes_stains_and_a_shadows_edge_are_no_cracks() -> None:
     rgb[:] = (rgb * (1 - 0.4 * stain[..., None])).astype(np.uint8)
     shade = (np.arange(700) + np.arange(500)[:, None] * 0.3 > 620)[..., None]
     rgb[:] = np.where(shade, rgb * 0.4, rgb).astype(np.uint8)
-    assert not detect_image(rgb, None, HAIRLINE, 1.0).mask.any()
+    assert not detect_image(rgb, None, RIDGE, 1.0).mask.any()
 
 
 def test_a_formwork_joint_is_told_from_the_crack_that_crosses_it() -> None:
     rgb = rough(600, 900, contrast=0.03)
     truth = with_crack(rgb, 300, 4, 0.5, 60, 840)
     cv2.line(rgb, (450, 0), (470, 599), (70, 70, 70), 4)
-    found = detect_image(rgb, None, HAIRLINE, 1.0)
+    found = detect_image(rgb, None, RIDGE, 1.0)
     joint = cv2.line(np.zeros((600, 900), np.uint8), (450, 0), (470, 599), 1, 4) > 0
     assert found_share(found.mask, truth) > 0.9
     assert (
@@ -100,13 +100,13 @@ def test_masked_pixels_have_no_say() -> None:
     masks = []
     for under in (0, 128, 255):
         rgb[~valid] = under
-        masks.append(detect_image(rgb, valid, HAIRLINE, 1.0).mask)
+        masks.append(detect_image(rgb, valid, RIDGE, 1.0).mask)
     assert (masks[0] == masks[1]).all() and (masks[1] == masks[2]).all()
     assert not masks[0][~valid].any()
     assert found_share(masks[0], truth & valid) > 0.9 and false_px(masks[0], truth) == 0
 
 
-@pytest.mark.parametrize("settings", [HAIRLINE, PAPER], ids=["hairline", "paper"])
+@pytest.mark.parametrize("settings", [RIDGE, PAPER], ids=["ridge", "paper"])
 def test_bands_give_what_the_whole_gives(settings: DetectSettings, monkeypatch: pytest.MonkeyPatch) -> None:
     rgb = rough(420, 300, contrast=0.08)
     with_crack(rgb, 200, 4, 0.7, 10, 290)
@@ -120,7 +120,7 @@ def test_bands_give_what_the_whole_gives(settings: DetectSettings, monkeypatch: 
     assert masks[0].any() and (masks[0] == masks[1]).all()
 
 
-@pytest.mark.parametrize("method", ["hairline", "paper", "global"])
+@pytest.mark.parametrize("method", ["hairline", "ridge", "paper", "global"])
 @pytest.mark.parametrize("level", [0, 128, 255])
 @pytest.mark.parametrize("shape", [(1, 1), (2, 300), (120, 90)])
 def test_flat_images_hold_no_crack(method: str, level: int, shape: tuple[int, int]) -> None:
@@ -135,7 +135,7 @@ def test_half_in_shade_finds_the_same_crack() -> None:
     rgb = rough(300, 800, contrast=0.03)
     truth = with_crack(rgb, 150, 4, 0.6, 40, 760)
     rgb[:] = (rgb * np.where(np.arange(800) < 400, 1.0, 0.5)[:, None]).astype(np.uint8)
-    ours = detect_image(rgb, None, HAIRLINE, 1.0).mask
+    ours = detect_image(rgb, None, RIDGE, 1.0).mask
     assert found_share(ours, truth) > 0.9 and false_px(ours, truth) == 0
     paper = detect_image(rgb, None, PAPER, 1.0).mask
     assert false_px(paper, truth) < 50
@@ -156,4 +156,4 @@ def test_a_drawn_crack_of_one_pixel_is_found() -> None:
     drawn = drawn_crack(lambda x: 0 * x + 1.0)
     truth = np.zeros(drawn.rgb.shape[:2], dtype=bool)
     truth[np.rint(drawn.y).astype(int), np.clip(np.rint(drawn.x), 0, 479).astype(int)] = True
-    assert found_share(detect_image(drawn.rgb, None, HAIRLINE, 1.0).mask, truth) > 0.9
+    assert found_share(detect_image(drawn.rgb, None, RIDGE, 1.0).mask, truth) > 0.9

@@ -1,0 +1,114 @@
+import hashlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from schemas.problem import BadInput
+from schemas.raster import ArrayRaster
+from schemas.settings import DetectSettings
+from tasks.detection import network
+from tasks.detection.detect import detect_image
+from tasks.detection.network import Model, filled, our_model, probability
+from tests.detection.test_detect import rough, with_crack
+from tests.detection.tiny_onnx import darkness
+
+GUEST = Model(darkness(), "guest.onnx")
+
+
+def test_a_guest_network_says_what_it_was_made_to_say() -> None:
+    rgb = np.full((50, 70, 3), 200, np.uint8)
+    rgb[20:30] = 20
+    p = probability(ArrayRaster(rgb), GUEST)
+    z = -20.0 * 3 * np.array([200, 20]) / 255 + 12.0
+    expected = np.rint(255 / (1 + np.exp(-z)))
+    assert p.shape == (50, 70)
+    assert (p[0, 0], p[25, 35]) == tuple(expected) and set(np.unique(p)) == set(expected.astype(int))
+
+
+def test_a_guest_finds_the_crack_that_it_can_see() -> None:
+    rgb = rough(200, 400, contrast=0.01)
+    truth = with_crack(rgb, 100, 5, 0.9, 20, 380)
+    settings = DetectSettings(method="onnx", model="guest.onnx")
+    found = detect_image(rgb, None, settings, None, model=GUEST)
+    assert (found.mask & truth).sum() > 0.5 * truth.sum() and not (found.mask & ~truth).sum() > truth.sum()
+    assert found.scores and all(one.score >= settings.min_score for one in found.scores)
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"", "cannot be read"),
+        (b"no network at all", "cannot be read"),
+        (darkness()[:60], "cannot be read"),
+        (darkness(channels_out=2), "with the shape"),
+    ],
+)
+def test_what_is_no_such_network_is_refused_by_name(content: bytes, what: str) -> None:
+    with pytest.raises(BadInput, match=f"guest.onnx: .*{what}"):
+        probability(ArrayRaster(np.zeros((20, 20, 3), np.uint8)), Model(content, "guest.onnx"))
+
+
+def test_our_network_is_small_and_is_the_one_that_the_code_names() -> None:
+    content = our_model().content
+    assert len(content) <= 1_000_000
+    assert hashlib.sha256(content).hexdigest() == network.SHA256
+    card = network.OURS.with_suffix(".md").read_text()
+    assert network.SHA256 in card
+
+
+@pytest.mark.parametrize("damage", ["altered", "cut short", "missing"])
+def test_a_damaged_file_of_ours_is_refused(
+    damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = bytearray(network.OURS.read_bytes())
+    if damage == "altered":
+        content[len(content) // 2] ^= 1
+    path = tmp_path / "a" / "b" / "hairline.onnx"
+    path.parent.mkdir(parents=True)
+    if damage != "missing":
+        path.write_bytes(content[: -1 if damage == "cut short" else None])
+    monkeypatch.setattr(network, "OURS", path)
+    with pytest.raises(BadInput, match=r"hairline.onnx: .*git checkout"):
+        our_model()
+
+
+def test_tiles_give_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within 4/255 everywhere and 1/255 nearly everywhere: the network sees a little beyond the halo."""
+    rgb = rough(500, 620, contrast=0.05)
+    with_crack(rgb, 250, 3, 0.6, 10, 600)
+    whole = probability(ArrayRaster(rgb), our_model()).astype(int)
+    monkeypatch.setattr(network, "TILE_PX", 160)
+    tiled = probability(ArrayRaster(rgb), our_model()).astype(int)
+    assert (whole > 200).any()
+    assert np.abs(tiled - whole).max() <= 4 and (np.abs(tiled - whole) > 1).mean() < 1e-3
+
+
+def test_the_number_of_threads_changes_nothing() -> None:
+    rgb = rough(300, 400)
+    with_crack(rgb, 150, 3, 0.6, 10, 390)
+    before = cv2.getNumThreads()
+    try:
+        answers = []
+        for threads in (1, 2, 3):
+            cv2.setNumThreads(threads)
+            answers.append(probability(ArrayRaster(rgb), our_model()))
+    finally:
+        cv2.setNumThreads(before)
+    assert (answers[0] == answers[1]).all() and (answers[0] == answers[2]).all()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (17, 3), (33, 16)])
+def test_any_size(shape: tuple[int, int]) -> None:
+    assert probability(ArrayRaster(np.full((*shape, 3), 99, np.uint8)), our_model()).shape == shape
+
+
+def test_what_is_unknown_takes_the_look_of_what_is_around_it() -> None:
+    rgb = np.full((120, 120, 3), 140, np.uint8)
+    valid = np.ones((120, 120), dtype=bool)
+    valid[40:80, 40:80] = False
+    rgb[~valid] = 7
+    assert np.abs(filled(rgb, valid).astype(int) - 140).max() <= 1
+    nothing = np.zeros((120, 120), dtype=bool)
+    assert not probability(ArrayRaster(rgb, nothing), our_model()).any()
