@@ -22,7 +22,7 @@ class Metadata:
     calibrated_focal_px: float | None  # DJI's own calibration
     gps: Vector3 | None  # latitude, longitude (degrees), altitude above take-off (m; 0: not known)
     view_deg: Vector3 | None  # yaw, pitch, roll of the gimbal
-    metered_ev: float | None  # log2 of exposure time (s) · ISO / 100 / f-number²
+    metered_ev: float | None = None  # log2 of exposure time (s) · ISO / 100 / f-number²
 
 
 def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:

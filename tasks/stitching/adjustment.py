@@ -28,15 +28,15 @@ from tasks.stitching.bundle import (
 from tasks.stitching.normal_equations import damped_step
 from tasks.stitching.prior import Prior
 from tasks.stitching.tracks import Observations
-from tasks.stitching.uncertainty import Certainty, certainty_of, learnt_roll
+from tasks.stitching.uncertainty import Certainty, certainty_of, learnt_roll, noise
 from tasks.stitching.view import Array, View
 
 # Each round adjusts, then drops outliers. Residuals are taken for at least this uncertain (px): wide weights
 # first, since narrow ones freeze whatever the first guess got wrong; SIFT is not better than the last.
 LEAST_SIGMA_PX = (2.0, 0.5, 0.1)
 ITERATIONS = 40
-CONVERGED = 1e-4  # relative fall of the cost
-ALIKE = 25.0  # so many points of a photo err alike (relief, shutter, lens): they count as one
+CONVERGED = 0.01  # fall of the cost: a hundredth of what one sigma of one unknown costs
+ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens) until residuals tell
 CAUCHY = 2.5  # residuals of this many sigma count half
 OUTLIER = 5.0  # and those of this many are dropped at the end
 LARGEST_ROLL = 0.004  # of the photo's height: 1σ of a rolling shutter's effect before any was seen
@@ -77,38 +77,41 @@ def adjust(
         bias=np.zeros(3),
         X=np.zeros((0, 2)),
     )
-    sigma, residual = 0.0, np.zeros((0, 2))
+    sigma, residual, variance = 0.0, np.zeros((0, 2)), ALIKE * LEAST_SIGMA_PX[0] ** 2
     sigma_roll = np.full(2, LARGEST_ROLL * max(c.height_px for c in cameras))
     for round_, least_sigma in enumerate(LEAST_SIGMA_PX):
         sigmas = [focal_sigmas[i] for i in seen]
         bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll)
         state = replace(state, X=points(state, bundle))
-        state, residual, sigma = _iterate(state, bundle, least_sigma)
+        state, residual, sigma = _iterate(state, bundle, least_sigma, variance)
+        weight, trust = _robust(residual, sigma), _trust(state, bundle)
+        variance = noise(bundle, residual, weight)
         on_progress((round_ + 1) / len(LEAST_SIGMA_PX))
         good = np.linalg.norm(residual, axis=1) < OUTLIER * sigma
         if round_ < len(LEAST_SIGMA_PX) - 1:
             current = current.where(good)
-            sigma_roll = learnt_roll(state, bundle, _weight(residual, sigma), _trust(state, bundle))
+            sigma_roll = learnt_roll(state, bundle, weight / variance, trust)
     adjusted = list(views)
     for k, i in enumerate(seen):
         adjusted[i] = bundle.view(state, k)
-    certainty = certainty_of(state, bundle, residual, _weight(residual, sigma), _trust(state, bundle))
+    certainty = certainty_of(state, bundle, weight / variance, trust)
     kept = replace(current, photo=seen[current.photo])
     return Adjusted(tuple(adjusted), kept, residual, sigma, state.bias, certainty)
 
 
-def _iterate(state: State, bundle: Bundle, least_sigma: float) -> tuple[State, Array, float]:
-    """To the minimum; residuals (M, 2) and their robust sigma there."""
+def _iterate(state: State, bundle: Bundle, least_sigma: float, variance: float) -> tuple[State, Array, float]:
+    """To the minimum; residuals (M, 2) and their robust sigma there. variance: of a coordinate of a fully
+    trusted observation, as if all were independent (px²)."""
     damping = 1e-4
     residual, jacobians = linearise(state, bundle)
     for _ in range(ITERATIONS):
         sigma = max(_sigma(residual), least_sigma)
-        cost = _cost(state, bundle, residual, sigma)
+        cost = _cost(state, bundle, residual, sigma, variance)
         while True:
-            weight, trust = _weight(residual, sigma), _trust(state, bundle)
+            weight, trust = _robust(residual, sigma) / variance, _trust(state, bundle)
             candidate = damped_step(state, bundle, residual, jacobians, weight, trust, damping)
             new_residual = residuals(candidate, bundle)
-            new_cost = _cost(candidate, bundle, new_residual, sigma)
+            new_cost = _cost(candidate, bundle, new_residual, sigma, variance)
             if new_cost <= cost or damping > 1e8:
                 break
             damping *= 8.0
@@ -116,7 +119,7 @@ def _iterate(state: State, bundle: Bundle, least_sigma: float) -> tuple[State, A
             break
         state, damping = candidate, max(damping / 3.0, 1e-9)
         residual, jacobians = linearise(state, bundle)
-        if cost - new_cost < CONVERGED * cost:
+        if cost - new_cost < CONVERGED:
             break
     return state, residual, max(_sigma(residual), least_sigma)
 
@@ -127,9 +130,9 @@ def _sigma(residual: Array) -> float:
     return float(np.median(lengths)) / 1.1774
 
 
-def _weight(residual: Array, sigma: float) -> Array:
-    """(M,) 1/px²."""
-    return np.asarray(1.0 / (1.0 + _squares(residual, sigma)) / sigma**2 / ALIKE)
+def _robust(residual: Array, sigma: float) -> Array:
+    """(M,) share of each observation that counts, 0..1."""
+    return np.asarray(1.0 / (1.0 + _squares(residual, sigma)))
 
 
 def _trust(state: State, bundle: Bundle) -> Array:
@@ -148,13 +151,13 @@ def _far(state: State, bundle: Bundle) -> Array:
     return np.asarray((bundle.weight_position * moved**2).sum(axis=1) / FAR**2)
 
 
-def _cost(state: State, bundle: Bundle, residual: Array, sigma: float) -> float:
+def _cost(state: State, bundle: Bundle, residual: Array, sigma: float, variance: float) -> float:
     """Twice the negative logarithm of the likelihood, but for a constant."""
     if not np.isfinite(residual).all():
         return float("inf")
     turned, _ = prior_errors(state, bundle)
     terms = (
-        CAUCHY**2 / ALIKE * np.log1p(_squares(residual, sigma)).sum(),
+        (CAUCHY * sigma) ** 2 / variance * np.log1p(_squares(residual, sigma)).sum(),
         FAR**2 * np.log1p(_far(state, bundle)).sum(),
         (bundle.weight_rotation * turned**2).sum(),
         (bundle.weight_bias * state.bias**2).sum(),

@@ -25,8 +25,9 @@ class Certainty:
 
 
 def learnt_roll(state: State, bundle: Bundle, weight: Array, trust: Array) -> Array:
-    """(2,) 1σ in pixels of what the rolling shutter does in x and y: the value under which what was found is
-    most likely (MacKay 1992, eq. 2.32: squares found over how many of the numbers the data determined)."""
+    """(2,) 1σ in pixels of what the rolling shutter does in x and y: squares found over how many of the
+    numbers the data determined (MacKay 1992), less two, since a variance learnt from few is itself unsure
+    (the mean of its inverse-χ² distribution)."""
     n = len(state.C)
     residual, jacobians = linearise(state, bundle)
     system = reduced(state, bundle, residual, jacobians, weight, trust, 0.0)
@@ -34,15 +35,15 @@ def learnt_roll(state: State, bundle: Bundle, weight: Array, trust: Array) -> Ar
     own = PER_PHOTO * np.arange(n)[:, None] + [6, 7]
     unit[own.ravel(), np.arange(2 * n)] = 1.0
     variance = np.einsum("ik,ik->k", unit, solve_positive(system.S, unit, bundle.shared)).reshape(n, 2)
-    determined = (1.0 - variance / bundle.sigma_roll**2).clip(1e-3).sum(axis=0)
-    return np.asarray(np.sqrt((state.roll**2).sum(axis=0) / determined).clip(LEAST_ROLL_PX))
+    determined = (1.0 - variance / bundle.sigma_roll**2).sum(axis=0)
+    found = np.sqrt((state.roll**2).sum(axis=0) / (determined - 2.0).clip(1.0))
+    return np.asarray(found.clip(LEAST_ROLL_PX))
 
 
-def certainty_of(state: State, bundle: Bundle, residual: Array, weight: Array, trust: Array) -> Certainty:
-    """Of the bundle's photos. The weights are brought to what the residuals truly scatter."""
-    noise = _noise(bundle, residual, weight)
-    _, jacobians = linearise(state, bundle)
-    system = reduced(state, bundle, residual, jacobians, weight / (weight.max() * noise), trust, 0.0)
+def certainty_of(state: State, bundle: Bundle, weight: Array, trust: Array) -> Certainty:
+    """Of the bundle's photos; weights as in the adjustment."""
+    residual, jacobians = linearise(state, bundle)
+    system = reduced(state, bundle, residual, jacobians, weight, trust, 0.0)
     middles, J = _middles(state, bundle, len(system.g))
     covariance = J @ solve_positive(system.S, np.ascontiguousarray(J.T), bundle.shared)
     n, z = len(state.C), middles - middles.mean(axis=0)
@@ -63,10 +64,9 @@ def _own_blocks(covariance: Array) -> Array:
     return np.ascontiguousarray(covariance.reshape(n, 2, n, 2)[k, :, k, :])
 
 
-def _noise(bundle: Bundle, residual: Array, weight: Array) -> float:
+def noise(bundle: Bundle, residual: Array, share: Array) -> float:
     """Variance (px²) of a coordinate of a fully trusted observation, as if all were independent: what they
     scatter within a cell of a photo, times how much more the cells' means scatter than that explains."""
-    share = weight / weight.max()
     cell = bundle.photo * CELLS[0] * CELLS[1] + _cell(bundle)
     cells = int(cell.max()) + 1
     count = np.bincount(cell, minlength=cells)

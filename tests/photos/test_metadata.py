@@ -36,6 +36,20 @@ def test_place_and_view_of_a_dji_photo() -> None:
     assert (found.focal_mm, found.focal_35mm) == (3.61, 20.0)
 
 
+@pytest.mark.parametrize(
+    ("camera", "ev"),
+    [
+        ({33434: IFDRational(1, 500), 34855: 400, 33437: 2.0}, -8.966),  # log2(1/500 · 4 / 4)
+        ({33434: IFDRational(1, 500), 34855: (400, 400), 33437: 2.0}, -8.966),
+        ({33434: IFDRational(1, 500), 33437: 2.0}, None),
+        ({33434: 0, 34855: 400, 33437: 2.0}, None),
+        ({33434: "fast", 34855: 400, 33437: 2.0}, None),
+    ],
+)
+def test_exposure_is_told_by_all_three_or_not_at_all(camera: dict[int, object], ev: float | None) -> None:
+    assert read_metadata(exif_with({}, camera), b"").metered_ev == pytest.approx(ev, abs=1e-3)
+
+
 def test_a_gimbal_rolled_over_looks_where_it_looks() -> None:
     """DJI: pitch −88, roll 180, yaw 10 is pitch −92 at yaw 190 unrolled."""
     xmp = b'GimbalRollDegree="180.0" GimbalYawDegree="10.0" GimbalPitchDegree="-88.0"'

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from schemas.camera import Camera
 from tasks.stitching.blending import MultiBand
-from tasks.stitching.gain import gain_table, srgb_to_linear
+from tasks.stitching.gain import Light, gain_table, solve_light, srgb_to_linear, unvignetted
+from tasks.stitching.view import FACING, View
 
 
 def test_one_layer_is_left_as_it_is() -> None:
@@ -43,3 +45,51 @@ def test_gains_act_on_linear_light() -> None:
     assert doubled[137] == pytest.approx(188, abs=1.0)  # 0.25 → 0.5
     assert doubled.max() == 255.0
     np.testing.assert_allclose(gain_table(1.0), np.arange(256), atol=0.01)
+
+
+CAMERA = Camera(width_px=480, height_px=360, focal_px=480.0)
+FALLOFF = 0.3  # of the light, lost in the corners
+SET = np.array([0.9, 1.1, 1.2, 0.85, 1.0, 1.05])  # exposures
+
+
+def row_of_photos(shine: float = 0.0) -> tuple[list[View], list[np.ndarray]]:
+    """Six photos of a grey wall, 60 % overlap; each darker in its corners and, by `shine`, to its right."""
+    views, photos = [], []
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[:360, :480]
+    rho2 = ((x - 239.5) ** 2 + (y - 179.5) ** 2) * 4 / (480**2 + 360**2)
+    for k, exposed in enumerate(SET):
+        views.append(View(CAMERA, FACING, np.array([0.4 * k, 0.0, 1.0])))
+        light = 0.2 * exposed * (1 - FALLOFF * rho2) * np.exp(-shine * (x / 480 - 0.5))
+        srgb = 255 * (1.055 * (light * np.array([[[1.0]], [[0.9]], [[0.8]]])) ** (1 / 2.4) - 0.055)
+        noisy = np.moveaxis(srgb, 0, 2) + rng.normal(0, 1, (360, 480, 3))
+        photos.append(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
+    return views, photos
+
+
+def solved(views: list[View], photos: list[np.ndarray], metered: list[float | None]) -> Light:
+    pairs = [(k, k + 1) for k in range(5)] + [(k, k + 2) for k in range(4)]
+    return solve_light(views, photos.__getitem__, pairs, metered, lambda _: None)
+
+
+def test_exposure_and_falloff_are_told_apart() -> None:
+    views, photos = row_of_photos()
+    light = solved(views, photos, [None] * 6)
+    evened = light.gains[:, 1] * SET
+    assert np.abs(evened / evened.mean() - 1).max() < 0.005
+    at = np.stack(np.meshgrid(np.arange(480.0), np.arange(360.0)), axis=-1).astype(np.float32)
+    flat = unvignetted(photos[2].astype(np.float32), at, views[2], light.falloff[2])
+    middle, corner = flat[170:190, 230:250].mean(), flat[:20, :20].mean()
+    assert corner == pytest.approx(middle, rel=0.02)
+    assert photos[2][:20, :20].mean() < 0.9 * middle
+
+
+def test_gains_do_not_drift_where_the_camera_says_what_it_set() -> None:
+    """A wall that shines more to the left of each photo looks like photos that grow darker to the right."""
+    views, photos = row_of_photos(shine=0.3)
+    drift = [
+        float(np.ptp(np.log(solved(views, photos, metered).gains[:, 1] * SET)))
+        for metered in ([None] * 6, list(np.log2(SET)))
+    ]
+    assert drift[0] > 0.4
+    assert drift[1] < 0.5 * drift[0]

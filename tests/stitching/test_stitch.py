@@ -170,6 +170,23 @@ def test_foreign_and_blurred_photos_are_rejected_by_name(wall: PhotoSet, folder:
     assert sum(s == "solved" for s in found.values()) == 12
 
 
+def test_a_second_wall_is_left_out_whole(wall: PhotoSet, folder: Path) -> None:
+    """Three photos match one another, and their poses say this wall, but they match none of its photos."""
+    other = concrete(seed=98)
+    poses = {p.name: p.pose for p in wall.photos if p.pose is not None}
+    shots = [wall.truth[wall.photos[5].name][1]] * 3
+    shifted = [
+        pose.model_copy(update={"position_m": (pose.position_m[0] + 0.2 * k, *pose.position_m[1:])})
+        for k, pose in enumerate(shots)
+    ]
+    images = {f"other-{k}.png": render(other, CAMERA, pose, seed=70 + k) for k, pose in enumerate(shifted)}
+    said = dict.fromkeys(images, poses[wall.photos[5].name])
+    mosaic = wall.plus(photo_set(folder, images, wall.photos[0].camera, {}, said)).stitch(WALL)
+    found = status(mosaic)
+    assert {found[name] for name in images} == {"rejected"}
+    assert sum(s == "solved" for s in found.values()) == 12
+
+
 def test_photos_without_texture_are_placed_by_their_pose(wall: PhotoSet, folder: Path) -> None:
     """Three photos of a blank wall: nothing to match, but their poses say where."""
     blank = Texture(np.full((3000, 4000), 0.3, np.float32), 0.0015, -1.0, 3.5)

@@ -1,0 +1,97 @@
+"""The adjustment alone, on points that cameras truly saw: rolling shutters, and how well it knows itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from schemas.camera import Camera
+from tasks.stitching.adjustment import Adjusted, adjust
+from tasks.stitching.prior import Prior
+from tasks.stitching.tracks import Observations
+from tasks.stitching.view import FACING, View, rotation
+
+Array = npt.NDArray[np.float64]
+CAMERA = Camera(width_px=1600, height_px=1200, focal_px=2000.0, k1=-0.03)
+POINTS = 1200
+
+
+def flown(seed: int, roll_px: float) -> list[View]:
+    """4 × 3 photos, 60 % overlap, 1.5° and 5 cm of jitter, 4 m away; rolling shutters each its own way."""
+    rng = np.random.default_rng(seed)
+    views = []
+    for k in range(12):
+        at = np.array([1.3 * (k % 4), 1.0 * (k // 4), 4.0]) + rng.normal(0, 0.05, 3)
+        turn = rotation(np.radians(rng.normal(0, 1.5, 3)))
+        views.append(View(CAMERA, FACING @ turn, at, rng.normal(0, roll_px, 2)))
+    return views
+
+
+def adjusted(true: list[View], noise_px: float, seed: int) -> Adjusted:
+    """From positions off by 5 cm and level cameras without rolling shutter and distortion."""
+    rng = np.random.default_rng([seed, 1])
+    X = rng.uniform((-1.5, -1.2), (5.5, 3.3), (POINTS, 2))
+    photo, track, xy = [], [], []
+    for i, view in enumerate(true):
+        px = view.to_photo(X) + rng.normal(0, noise_px, X.shape)
+        seen = np.flatnonzero(((px > 0) & (px < [1599, 1199])).all(axis=1))
+        photo.append(np.full(len(seen), i))
+        track.append(seen)
+        xy.append(px[seen])
+    order = np.argsort(np.concatenate(track), kind="stable")
+    plain = CAMERA.model_copy(update={"k1": 0.0})
+    seen = Observations(np.concatenate(photo)[order], np.concatenate(track)[order], np.concatenate(xy)[order])
+    every = Observations(seen.photo, seen.track, seen.xy).where(np.ones(len(order), bool))
+    said = [
+        replace(v, camera=plain, R=FACING, C=v.C + rng.normal(0, 0.05, 3), roll_px=np.zeros(2)) for v in true
+    ]
+    priors = [Prior(v, np.full(3, 0.05), np.radians(np.full(3, 2.0))) for v in said]
+    return adjust(said, every, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None)
+
+
+def off_m(found: Adjusted, true: list[View], px: Array) -> Array:
+    """(photos, N, 2) metres between where pixels lie and where they were found, after the best similarity."""
+    z = np.concatenate([_on_plane(v, px) for v in found.views]) @ [1, 1j]
+    w = np.concatenate([_on_plane(v, px) for v in true]) @ [1, 1j]
+    columns = np.column_stack([z, np.ones(len(z))])
+    left = columns @ np.linalg.lstsq(columns, w, rcond=None)[0] - w
+    return np.column_stack([left.real, left.imag]).reshape(len(true), -1, 2)
+
+
+def _on_plane(view: View, px: Array) -> Array:
+    """Pixels as taken: the rolling shutter undone first, then the lens."""
+    still = px - ((px[:, 1:] + 0.5) / 1200 - 0.5) * view.roll_px
+    c = view.camera
+    ideal = c.undistort((still - c.principal_px) / c.focal_px) * c.focal_px + c.principal_px
+    return replace(view, roll_px=np.zeros(2)).to_plane(ideal)
+
+
+CORNERS = np.array([[0.0, 0.0], [1599.0, 0.0], [1599.0, 1199.0], [0.0, 1199.0], [800.0, 600.0]])
+PIXEL_M = 0.002
+
+
+@pytest.mark.parametrize(("roll_px", "most_px"), [(0.0, 0.2), (3.0, 2.0)])
+def test_is_metric_with_and_without_a_rolling_shutter(roll_px: float, most_px: float) -> None:
+    """3 px of shutter each, left in, would bend the mosaic by pixels; what all share cannot be seen."""
+    true = flown(20, roll_px)
+    found = adjusted(true, 0.3, 20)
+    rms_px = float(np.sqrt((off_m(found, true, CORNERS) ** 2).sum(axis=2).mean())) / PIXEL_M
+    assert rms_px < most_px
+    if roll_px == 0.0:
+        assert np.abs([v.roll_px for v in found.views]).max() < 0.1
+    else:
+        rest = np.array([f.roll_px - t.roll_px for f, t in zip(found.views, true, strict=True)])
+        assert (rest - rest.mean(axis=0)).std() < 1.0
+
+
+def test_errors_are_as_large_as_it_says() -> None:
+    """12 photos, 5 draws of few truly free numbers each: mean d²/2 near 1, most inside the 99 % ellipse."""
+    d2 = []
+    for seed in range(20, 25):
+        true = flown(seed, 1.0)
+        found = adjusted(true, 0.3, seed)
+        off = off_m(found, true, CORNERS[4:])[:, 0]
+        d2 += [float(e @ np.linalg.solve(c, e)) for e, c in zip(off, found.certainty.relative, strict=True)]
+    assert 0.5 < np.mean(d2) / 2 < 2.0
+    assert np.mean(np.array(d2) < 9.21) >= 0.9
