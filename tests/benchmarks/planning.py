@@ -235,19 +235,15 @@ def coverage() -> list[Row]:
         made, _ = plan_and_prove(structure, points, camera, vehicle, origin, None, settings)
         data = f"{name}: {len(made.shooting_points)} photos, {len(made.flights)} flights, 200 draws"
         for c in made.coverage:
+            reasons = f"{data}; {'; '.join(c.not_reached)}"
+            rows.append(row(f"{c.surface}: can be reached", 100 * c.reachable, "%", None, reasons, "1"))
+            if c.twice is None or c.twice_median is None or c.twice_p05 is None or c.reachable == 0.0:
+                continue
             of = f"{c.surface}: reachable area in two photos"
             rows += [
-                row(f"{of}, exact positions", 100 * (c.twice or 0), "%", "≥ 99.5", data, "1"),
-                row(f"{of}, median of draws", 100 * (c.twice_median or 0), "%", "≥ 99", data, "1"),
-                row(f"{of}, P05 of draws", 100 * (c.twice_p05 or 0), "%", "≥ 97", data, "1"),
-                row(
-                    f"{c.surface}: can be reached",
-                    100 * c.reachable,
-                    "%",
-                    None,
-                    f"{data}; {'; '.join(c.not_reached)}",
-                    "1",
-                ),
+                row(f"{of}, exact positions", 100 * c.twice, "%", "≥ 99.5", data, "1"),
+                row(f"{of}, median of draws", 100 * c.twice_median, "%", "≥ 99", data, "1"),
+                row(f"{of}, P05 of draws", 100 * c.twice_p05, "%", "≥ 97", data, "1"),
             ]
     return rows
 
