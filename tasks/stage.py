@@ -118,7 +118,7 @@ class Stage(Generic[P, R]):
             return cast(R, self._look_up(inputs))
         parents = _parents(inputs)
         state = self._stored_task()(**_quoted(inputs), wait_for=parents, return_state=True)
-        result = cast(R, state.result())
+        result = state.result()
         run.current().lineage.leave(result, state.state_details.task_run_id)
         return result
 
