@@ -101,7 +101,7 @@ def _crack(
     path = (
         heading
         + turn * _walk(rng, n, rng.uniform(15, 80))
-        + np.radians(max(rng.uniform(-20, 35), 0.0)) * _walk(rng, n, 3.0)  # a third of them smooth
+        + np.radians(rng.uniform(6, 35)) * _walk(rng, n, 3.0)
     )
     uv = start + STEP_PX * px_m * np.cumsum(np.column_stack([np.cos(path), np.sin(path)]), axis=0)
     inside = np.flatnonzero(((uv < 0) | (uv > side_m)).any(axis=1))
@@ -112,7 +112,7 @@ def _crack(
         if rng.random() < 0.35
         else (float(rng.uniform(0.8, 4.5)))
     )
-    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.75))))
+    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.62))))
     if trunk is not None:
         width_px = float(np.median(trunk.left_m + trunk.right_m)) / px_m * rng.uniform(0.35, 0.9)
         kept = float(trunk.kept_light.mean())
@@ -126,7 +126,7 @@ def _crack(
         width *= 1.0 - rng.uniform(0.4, 1.0) * np.exp(-(((np.arange(n) - at) / reach) ** 2))
     rough = rng.uniform(0.02, 0.15)
     left, right = (np.maximum(width * (0.5 + rough * _walk(rng, n, 1.5)), 0.0) for _ in range(2))
-    light = np.clip(kept + 0.06 * _walk(rng, n, 40.0), 0.05, 0.85)
+    light = np.clip(kept + 0.06 * _walk(rng, n, 40.0), 0.05, 0.75)
     return CrackShape("c", None, uv[:n], left, right, light)
 
 
@@ -261,9 +261,9 @@ def _pores(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
 def _things(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
     """What lies on top: cables, chalk, markers, scratches."""
     shapes: list[Shapes] = []
-    for _ in range(rng.poisson(0.2)):  # a cable or wire, its shadow beside it
+    for _ in range(rng.poisson(0.35)):  # a cable or wire, its shadow beside it
         start, end = _through(rng, side_m, rng.uniform(0, np.pi))
-        bow, wide = rng.normal(0, 0.015) * side_m, rng.uniform(1.0, 9.0) * px_m
+        bow, wide = rng.normal(0, 0.04) * side_m, rng.uniform(1.0, 9.0) * px_m
         shapes.append(_straight(start, end, wide, float(rng.uniform(0.08, 0.5)), bow))
         if rng.random() < 0.4:
             off = rng.uniform(1.2, 4.0) * wide * np.array([1.0, -1.0])
