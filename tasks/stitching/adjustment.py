@@ -36,6 +36,7 @@ from tasks.stitching.view import Array, View
 LEAST_SIGMA_PX = (2.0, 0.5, 0.1)
 ITERATIONS = 40
 CONVERGED = 0.01  # fall of the cost: a hundredth of what one sigma of one unknown costs
+LEAST_DAMPING = 1e-11  # more would hold back what the photos all share, which they hardly tell
 ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens) until residuals tell
 CAUCHY = 2.5  # residuals of this many sigma count half
 OUTLIER = 5.0  # and those of this many are dropped at the end
@@ -90,6 +91,7 @@ def adjust(
         good = np.linalg.norm(residual, axis=1) < OUTLIER * sigma
         if round_ < len(LEAST_SIGMA_PX) - 1:
             current = current.where(good)
+        if round_ == len(LEAST_SIGMA_PX) - 2:  # once, before anything was held back: it would shrink further
             sigma_roll = learnt_roll(state, bundle, weight / variance, trust)
     adjusted = list(views)
     for k, i in enumerate(seen):
@@ -117,9 +119,9 @@ def _iterate(state: State, bundle: Bundle, least_sigma: float, variance: float) 
             damping *= 8.0
         if not new_cost <= cost:
             break
-        state, damping = candidate, max(damping / 3.0, 1e-9)
+        state, damping = candidate, max(damping / 10.0, LEAST_DAMPING)
         residual, jacobians = linearise(state, bundle)
-        if cost - new_cost < CONVERGED:
+        if cost - new_cost < CONVERGED and damping <= LEAST_DAMPING:
             break
     return state, residual, max(_sigma(residual), least_sigma)
 
