@@ -24,7 +24,8 @@ class Store:
         return self.root / "objects" / sha256[:2] / f"{sha256}{suffix}"
 
     def put(self, path: Path, suffix: str | None = None) -> File:
-        """Enter a file that stays where it is (reflink or hard link where the disk allows, else a copy)."""
+        """Enter a file that stays where it is (reflink or hard link where the disk allows, else a copy), and
+        is not written to again."""
         file = File(sha256=digest(path), size=path.stat().st_size, suffix=suffix or path.suffix.lower())
         target = self._object(file.sha256, file.suffix)
         if not self.holds(file):

@@ -97,8 +97,8 @@ def plan_flight(
     )
     coverage = []
     with shelf.scratch() as folder:
-        for of_surface, widths in zip(made.coverage, maps, strict=True):
-            path = folder / "width_mm.tif"
+        for number, (of_surface, widths) in enumerate(zip(made.coverage, maps, strict=True)):
+            path = folder / f"width_{number}_mm.tif"  # a name of its own: what was put is linked, not copied
             tifffile.imwrite(path, widths.width_mm, compression="zlib", metadata=None)
             coverage.append(of_surface.model_copy(update={"width_map": shelf.put(path)}))
     return made.model_copy(update={"coverage": tuple(coverage)})
