@@ -283,7 +283,8 @@ def expose(
             light_sum, share, owner, edge, edge_owner, me, near.size[me], rays,
             (position - near.origin[me]) @ axes.T, axes @ R, wide,
             turn, axes @ motion.velocity_m_s * camera.shutter_s, coarse, fine,
-            skin.tone, skin.texel_m, skin.relief_m, skin.relief_texel_m, light.irradiance, light.texel_m, skin.grain, skin.grain_texel_m,
+            skin.tone, skin.texel_m, skin.relief_m, skin.relief_texel_m,
+            light.irradiance, light.texel_m, skin.grain, skin.grain_texel_m,
             np.cos(angle), np.sin(angle), marks.columns, marks.rows, marks.start, marks.items,
             marks.kind, marks.paint, marks.p, marks.rgb,
         )  # fmt: skip
