@@ -2,7 +2,6 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
-PHOTOS ?= ../shared/data/cracks/uav
 BENCHES := detection planning scans stitching
 
 .PHONY: demo test check bench $(addprefix bench-,$(BENCHES)) train-detector lock clean
@@ -24,7 +23,8 @@ bench: $(addprefix bench-,$(BENCHES))
 $(addprefix bench-,$(BENCHES)): bench-%: .venv/.ready
 	$(BIN)/python -m tests.benchmarks.$* $(ARGS)
 
-train-detector: .venv/.ready  # two hours on two cores; PHOTOS holds images/, masks/ and groups.txt (CC0)
+train-detector: .venv/.ready  # two hours on two cores; PHOTOS=FOLDER holds images/, masks/ and groups.txt
+	@[ -n "$(PHOTOS)" ] || { echo "Name the photos: make train-detector PHOTOS=FOLDER"; exit 1; }
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[train]'
 	$(BIN)/python -m training.surfaces build/training/surfaces 330
 	$(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/run --fold 0

@@ -71,7 +71,7 @@ def detect(
     images: Path,
     *,
     out: OutFolder,
-    method: Method = "ridge",
+    method: Method = "hairline",
     gsd_mm_px: float | None = None,
     global_threshold: int | None = None,
     model: Path | None = None,

@@ -20,6 +20,7 @@ from schemas.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from schemas.camera import Camera
+    from schemas.structure import Structure
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -83,6 +84,9 @@ def plan(
     area_m2:
         With --what-if: area to photograph, square metres.
     """
+    from schemas.structure import Structure
+
+    structure = read_contract(surfaces, Structure) if surfaces is not None else None
     lens = read_camera(camera)
     vehicle, settings = _sections(
         camera,
@@ -98,13 +102,14 @@ def plan(
     if what_if:
         _what_if(lens, vehicle, settings, area_m2, stand_off_m)
         return
-    if surfaces is None or out is None:
+    if surfaces is None or structure is None or out is None:
         raise BadInput("plan", "needs surfaces.json and --out", "Give both, or --what-if for a table alone")
-    _plan(surfaces, out, lens, vehicle, settings, home_m, origin, close_ups)
+    _plan(surfaces, structure, out, lens, vehicle, settings, home_m, origin, close_ups)
 
 
 def _plan(
     surfaces: Path,
+    structure: "Structure",
     out: Path,
     camera: "Camera",
     vehicle: Vehicle,
@@ -117,10 +122,8 @@ def _plan(
     from flows.results import write_flight_plan
     from schemas.crack_report import CrackReport
     from schemas.geodesy import GeoOrigin
-    from schemas.structure import Structure
     from tasks.planning.task import effort, plan_flight
 
-    structure = read_contract(surfaces, Structure)
     cracks = read_contract(close_ups, CrackReport).cracks if close_ups else ()
     where = (
         GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])

@@ -74,7 +74,7 @@ class PatternSettings(Contract):
 
 
 class DetectSettings(Contract):
-    method: Literal["hairline", "ridge", "paper", "global", "onnx"] = "ridge"
+    method: Literal["hairline", "ridge", "paper", "global", "onnx"] = "hairline"
     model: str | None = None  # of `onnx`: the network's file, beside the inspection file
     min_score: float = Field(
         default=0.5, ge=0, le=1

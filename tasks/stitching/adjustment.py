@@ -3,10 +3,10 @@
 Unknown: eight numbers a photo (rotation, position, rolling shutter), a focal length and k1 per camera, the
 positions' common error, two coordinates per track on the plane. Residuals are pixels of the photos as taken,
 through the full Brown model, so nothing is gained by shrinking the mosaic: what is left free is a similarity,
-which the priors hold. How much a rolling shutter may do is learnt from all photos together: free to do
-anything in each, it would make them free homographies, which are not metric. Levenberg-Marquardt with Cauchy
-weights; tracks are eliminated (Schur complement, Triggs et al. 2000, section 6), photos remain as a banded
-system."""
+which the priors hold. How much a rolling shutter may do is learnt from all photos together, where they tell
+of one at all: free to do anything in each, it would make them free homographies, which are not metric.
+Levenberg-Marquardt with Cauchy weights; tracks are eliminated (Schur complement, Triggs et al. 2000, section
+6), photos remain as a banded system."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ from tasks.stitching.bundle import (
 from tasks.stitching.normal_equations import damped_step
 from tasks.stitching.prior import Prior
 from tasks.stitching.tracks import Observations
-from tasks.stitching.uncertainty import Certainty, certainty_of, learnt_roll, noise
+from tasks.stitching.uncertainty import LEAST_ROLL_PX, Certainty, certainty_of, learnt_roll, noise
 from tasks.stitching.view import Array, View
 
 # Each round adjusts, then drops outliers. Residuals are taken for at least this uncertain (px): wide weights
@@ -41,6 +41,7 @@ ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens) un
 CAUCHY = 2.5  # residuals of this many sigma count half
 OUTLIER = 5.0  # and those of this many are dropped at the end
 LARGEST_ROLL = 0.004  # of the photo's height: 1σ of a rolling shutter's effect before any was seen
+NO_ROLL = np.full(2, LEAST_ROLL_PX)
 FAR = 3.0  # positions off by so many sigma count half: some photo bears another's
 
 
@@ -92,13 +93,29 @@ def adjust(
         if round_ < len(LEAST_SIGMA_PX) - 1:
             current = current.where(good)
         if round_ == len(LEAST_SIGMA_PX) - 2:  # once, before anything was held back: it would shrink further
-            sigma_roll = learnt_roll(state, bundle, weight / variance, trust)
+            if _is_told(state, bundle, least_sigma, variance):
+                sigma_roll = learnt_roll(state, bundle, weight / variance, trust)
+            else:
+                sigma_roll, state = NO_ROLL, replace(state, roll=np.zeros_like(state.roll))
     adjusted = list(views)
     for k, i in enumerate(seen):
         adjusted[i] = bundle.view(state, k)
     certainty = certainty_of(state, bundle, weight / variance, trust)
     kept = replace(current, photo=seen[current.photo])
     return Adjusted(tuple(adjusted), kept, residual, sigma, state.bias, certainty)
+
+
+def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) -> bool:
+    """Whether the photos tell of a rolling shutter: residuals without one cost more than its two numbers a
+    photo may (Schwarz 1978)."""
+    stiff = replace(bundle, sigma_roll=NO_ROLL)
+    start = replace(state, roll=np.zeros_like(state.roll))
+    without, residual, _ = _iterate(start, stiff, least_sigma, variance)
+    sigma = max(_sigma(residual), least_sigma)
+    saved = _cost(without, stiff, residual, sigma, variance) - _cost(
+        state, bundle, residuals(state, bundle), sigma, variance
+    )
+    return bool(saved > state.roll.size * np.log(len(residual)))
 
 
 def _iterate(state: State, bundle: Bundle, least_sigma: float, variance: float) -> tuple[State, Array, float]:

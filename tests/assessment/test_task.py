@@ -22,7 +22,7 @@ def reported(own_store: Path, height_m: float, left_out: tuple[LeftOut, ...] = (
     rgb[20:50, 40:70] = (235, 60, 170)
     surface = wall(0.48, height_m)
     mosaic = mosaic_of(Store(own_store), rgb, GSD_MM_PX, surface)
-    settings = DetectSettings()
+    settings = DetectSettings(method="ridge")
     patterns = remove_patterns.bare(mosaic, PatternSettings())
     measured = measure.bare(mosaic, patterns, detect.bare(mosaic, patterns, settings), settings)
     other = surface.model_copy(update={"name": "pier"})

@@ -22,7 +22,7 @@ def test_a_minimal_file_gets_every_default(tmp_path: Path) -> None:
     path.write_text("name: bridge-7\nphotos:\n  - folder: photos\n")
     inspection = read_inspection(path)
     assert inspection.photos[0].stitch
-    assert inspection.detect.method == "ridge"
+    assert inspection.detect.method == "hairline"
     assert inspection.registration.tau_m == 0.10
 
 

@@ -12,7 +12,7 @@ from tests.measurement.drawn_crack import Drawn, drawn_crack
 
 
 def measured(drawn: Drawn) -> MeasuredImage:
-    mask = detect_image(drawn.rgb, None, DetectSettings(), None).mask
+    mask = detect_image(drawn.rgb, None, DetectSettings(method="ridge"), None).mask
     return measure_cracks(ArrayRaster(drawn.rgb), mask, 30, 15)
 
 

@@ -21,7 +21,7 @@ Chain = tuple[Patterns, Detection, Measurement]
 
 
 def through(mosaic: Mosaic, settings: DetectSettings | None = None) -> Chain:
-    settings = settings or DetectSettings()
+    settings = settings or DetectSettings(method="ridge")
     taken_out = patterns.remove_patterns.bare(mosaic, PatternSettings())
     found = detection.detect.bare(mosaic, taken_out, settings)
     return taken_out, found, measurement.measure.bare(mosaic, taken_out, found, settings)
@@ -55,7 +55,9 @@ def test_a_crack_in_millimetres_and_in_the_world(own_store: Path) -> None:
 
 def test_without_a_scale_only_pixels_are_said(own_store: Path) -> None:
     drawn = drawn_crack(lambda x: 0 * x + 4.0)
-    _, found, result = through(mosaic_of(Store(own_store), drawn.rgb, None), DetectSettings(baselines=True))
+    _, found, result = through(
+        mosaic_of(Store(own_store), drawn.rgb, None), DetectSettings(method="ridge", baselines=True)
+    )
     crack = result.cracks[0]
     assert crack.length_px == pytest.approx(drawn.length_px, rel=0.02)
     assert crack.length_mm is None and crack.width_median_mm is None and crack.widths == ()
