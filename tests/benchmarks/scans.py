@@ -16,8 +16,8 @@ PARTS = {
 }
 OTHER_PEERS = {  # package: why it has no rows
     "kiss-matcher": "not installed: pip install -e .[bench]",
-    "CloudComPy": "CloudCompare's Python is on conda alone",
-    "cgal": "its Python binding leaves out Shape_detection",
+    "CloudComPy": "not on PyPI",
+    "cgal": "no row yet: its wheel holds CGAL_Shape_detection.efficient_RANSAC",
 }
 
 
