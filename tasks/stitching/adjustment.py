@@ -107,7 +107,7 @@ def adjust(
 
 def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) -> bool:
     """Whether the photos tell of a rolling shutter: residuals without one cost more than its two numbers a
-    photo may (Schwarz 1978)."""
+    photo may, two each (Akaike 1974)."""
     stiff = replace(bundle, sigma_roll=NO_ROLL)
     start = replace(state, roll=np.zeros_like(state.roll))
     without, residual, _ = _iterate(start, stiff, least_sigma, variance)
@@ -115,7 +115,7 @@ def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) 
     saved = _cost(without, stiff, residual, sigma, variance) - _cost(
         state, bundle, residuals(state, bundle), sigma, variance
     )
-    return bool(saved > state.roll.size * np.log(len(residual)))
+    return bool(saved > 2.0 * state.roll.size)
 
 
 def _iterate(state: State, bundle: Bundle, least_sigma: float, variance: float) -> tuple[State, Array, float]:
