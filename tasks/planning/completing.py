@@ -3,7 +3,7 @@ and the area that no place allows to see, with the reason."""
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from schemas.settings import PlanSettings
 from schemas.surface import Surface
 from schemas.vehicle import Vehicle
 from tasks.planning.airspace import Airspace
-from tasks.planning.coverage import Drawn, Samples, drawn, seen_by, seen_well
+from tasks.planning.coverage import Drawn, Indices, Samples, drawn, seen_by
 from tasks.planning.sight import Scene
 from tasks.planning.viewpoints import View, aim
 
@@ -54,7 +54,7 @@ def complete(
     samples: Samples,
 ) -> Completed:
     """connected: whether a way leads from home to each of (M, 3) free places."""
-    views = without_useless(surface, camera, gsd_mm_px, settings, scene, views)
+    views = without_useless(surface, camera, gsd_mm_px, settings, scene, views, samples)
     poses = [view.pose for view in views]
     seen = seen_by(surface, camera, poses, gsd_mm_px, settings.max_incidence_deg, scene, samples)
 
@@ -94,19 +94,21 @@ def complete(
     if different and reachable.any():
         error = vehicle.position_error_m / stand_off_m
         surely = _inner_frame(camera, vehicle.sideways_error_m / stand_off_m * camera.focal_px)
-        shown, _ = seen_well(
+        shown = seen_by(
             surface, surely, [v.pose for v in different], gsd_mm_px / (1 + error), settings.max_incidence_deg,
             scene, samples,
-        )  # fmt: skip
+        ).shown  # fmt: skip
         at_once = max(AT_ONCE[0], round(AT_ONCE[1] * len(views)))
         least = SMALLEST_GAIN_M2 / samples.cell_m**2
         lacking[~reachable] = 0.0
-        views = (*views, *_best(different, shown, lacking, most - len(views), least))
+        taken: set[int] = set()
+        views = (*views, *_best(different, shown, taken, lacking, most - len(views), least))
         while len(views) < most:  # as if flown, until the worst flights are good enough
             errs = flown(views)
             if np.quantile(errs.twice, 0.05) >= TARGET:
                 break
-            more = _best(different, shown, errs.lacking * reachable, min(at_once, most - len(views)), least)
+            few = min(at_once, most - len(views))
+            more = _best(different, shown, taken, errs.lacking * reachable, few, least)
             if not more:
                 break
             views = (*views, *more)
@@ -114,20 +116,20 @@ def complete(
 
 
 def _best(
-    different: list[View], shown: list[npt.NDArray[np.int64]], lacking: Array, most: int, least: float
+    different: list[View], shown: Sequence[Indices], taken: set[int], lacking: Array, most: int, least: float
 ) -> list[View]:
     """Up to `most` views, always the one next that shows most of what is lacking; a photo gives each sample
-    one. The chosen are emptied in `shown`."""
+    one. `taken`: numbers of those chosen before; the new ones join them."""
     lacking = lacking.copy()
     chosen: list[View] = []
     while len(chosen) < most:
-        gains = [float(lacking[s].sum()) for s in shown]
+        gains = [0.0 if k in taken else float(lacking[s].sum()) for k, s in enumerate(shown)]
         best = int(np.argmax(gains))
         if gains[best] <= least:
             break
         chosen.append(different[best])
         lacking[shown[best]] = np.maximum(lacking[shown[best]] - 1.0, 0.0)
-        shown[best] = shown[best][:0]
+        taken.add(best)
     return chosen
 
 
@@ -138,13 +140,14 @@ def without_useless(
     settings: PlanSettings,
     scene: Scene,
     views: tuple[View, ...],
+    samples: Samples,
 ) -> tuple[View, ...]:
     """The views but those that add no coverage: oblique ones whose every sample at least two others show.
     The perpendicular grid stays whole, since stitching needs its overlap."""
     if not any(view.incidence_deg > 0 for view in views):
         return views
     poses = [view.pose for view in views]
-    shown, _ = seen_well(surface, camera, poses, gsd_mm_px, settings.max_incidence_deg, scene)
+    shown = seen_by(surface, camera, poses, gsd_mm_px, settings.max_incidence_deg, scene, samples).shown
     photos: Counter[int] = Counter(s for each in shown for s in each.tolist())
     kept = list(range(len(views)))
     for number in sorted(kept, key=lambda n: -views[n].incidence_deg):

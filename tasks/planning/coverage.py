@@ -3,6 +3,7 @@ be instead when its position errs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ from tasks.planning.view_table import AROUND, FROM_SIGMA, view_table
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.int64]
 
 MOST_SAMPLES = 200_000  # of one surface
 SAMPLES_ACROSS = 12  # a photo's shorter side
@@ -46,6 +48,7 @@ class Seen:
     oblique: Flags  # (N,) seen, but at more than the largest incidence
     coarse: Flags  # (N,) seen, but with larger pixels
     best_mm_px: Array  # (N,) smallest pixel that sees it within the angle, inf where none does
+    shown: tuple[Indices, ...]  # of each photo the samples that it shows at the asked GSD and angle
 
     @property
     def covered(self) -> float:
@@ -83,39 +86,15 @@ def seen_by(
     count = len(samples.uv_m)
     photos = np.zeros(count, dtype=np.int64)
     hidden, oblique, coarse = (np.zeros(count, dtype=bool) for _ in range(3))
-    best = np.full(count, np.inf)
+    well, best = np.zeros(len(table.samples), dtype=bool), np.full(count, np.inf)
     _count(
         table.eyes_m, table.R_world_camera, table.first, table.samples, table.visible[0],
         samples.points_m, np.asarray(surface.plane.normal), *_optics(camera),
         gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9,
-        photos, np.zeros(len(table.samples), dtype=np.bool_), hidden, oblique, coarse, best,
+        photos, well, hidden, oblique, coarse, best,
     )  # fmt: skip
-    return Seen(samples.uv_m, samples.cell_m, photos, hidden, oblique, coarse, best)
-
-
-def seen_well(
-    surface: Surface,
-    camera: Camera,
-    poses: Sequence[CameraPose],
-    gsd_mm_px: float,
-    max_incidence_deg: float,
-    scene: Scene,
-    samples: Samples | None = None,
-) -> tuple[list[npt.NDArray[np.int64]], Samples]:
-    """Of each photo the numbers of the samples that it shows at the asked size of pixels and angle."""
-    samples = samples or samples_of(surface, camera, gsd_mm_px)
-    table = view_table(surface, camera, poses, samples.points_m, scene, 0.0)
-    count = len(samples.uv_m)
-    well = np.zeros(len(table.samples), dtype=np.bool_)
-    _count(
-        table.eyes_m, table.R_world_camera, table.first, table.samples, table.visible[0],
-        samples.points_m, np.asarray(surface.plane.normal), *_optics(camera),
-        gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9,
-        np.zeros(count, dtype=np.int64), well, np.zeros(count, dtype=np.bool_),
-        np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_), np.full(count, np.inf),
-    )  # fmt: skip
-    spans = zip(table.first, table.first[1:], strict=False)
-    return [table.samples[a:b][well[a:b]] for a, b in spans], samples
+    shown = tuple(table.samples[a:b][well[a:b]] for a, b in pairwise(table.first))
+    return Seen(samples.uv_m, samples.cell_m, photos, hidden, oblique, coarse, best, shown)
 
 
 def drawn(

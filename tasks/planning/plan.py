@@ -42,20 +42,6 @@ ENOUGH = 0.9  # squareness at which no shorter stand-off is tried
 MOST_CLOSE_UPS = 500  # photos of one surface that coming closer may cost
 
 
-def plan(
-    structure: Structure,
-    points_m: Array,
-    camera: Camera,
-    vehicle: Vehicle,
-    origin: GeoOrigin,
-    home_m: Vector3 | None,
-    settings: PlanSettings,
-    on_progress: Callable[[float], None] = lambda fraction: None,
-) -> FlightPlan:
-    """The plan of `plan_and_prove` without its maps."""
-    return plan_and_prove(structure, points_m, camera, vehicle, origin, home_m, settings, on_progress)[0]
-
-
 def plan_and_prove(
     structure: Structure,
     points_m: Array,

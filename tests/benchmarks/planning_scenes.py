@@ -7,43 +7,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from schemas.box import Box
 from schemas.camera import Camera
 from schemas.contract import Vector3
 from schemas.file import File
 from schemas.flight_plan import FlightPlan
 from schemas.geodesy import GeoOrigin
-from schemas.plane import Plane
 from schemas.settings import PlanSettings
 from schemas.structure import Structure
-from schemas.surface import Surface, in_plane_axes
+from schemas.surface import Surface
 from schemas.vehicle import Vehicle
+from tests.planning.structures import OPEN, points_on, rectangle
 
 Array = npt.NDArray[np.float64]
 
 SPACING_M = 0.05  # of the occupied points, as the extraction leaves them
 GROUND_SPACING_M = 0.1
-OPEN = Box(low_m=(-200.0, -200.0, -20.0), high_m=(200.0, 200.0, 150.0))  # air that somebody vouches for
 NO_FILE = File(sha256="0" * 64, size=0, suffix=".ply")
-
-
-def rectangle(name: str, middle_m: Vector3, normal: Vector3, width: float, height: float) -> Surface:
-    """`width` along u and `height` along v."""
-    n = np.asarray(normal) / np.linalg.norm(normal)
-    u, v = in_plane_axes(n)
-    a, b = width / 2, height / 2
-    outline = ((-a, -b), (a, -b), (a, b), (-a, b))
-    return Surface(
-        name=name, plane=Plane.through(middle_m, n), origin_m=middle_m, u=u, v=v,
-        outline_m=outline, hull_m=outline, area_m2=width * height,
-    )  # fmt: skip
-
-
-def points_on(surface: Surface, spacing_m: float = SPACING_M) -> Array:
-    u_low, v_low, u_high, v_high = surface.bounds_m
-    u = np.linspace(u_low, u_high, max(2, round((u_high - u_low) / spacing_m) + 1))
-    v = np.linspace(v_low, v_high, max(2, round((v_high - v_low) / spacing_m) + 1))
-    return surface.to_world(np.stack(np.meshgrid(u, v), -1).reshape(-1, 2))
 
 
 def structure_of(surfaces: list[Surface], points_m: Array, stations_m: tuple[Vector3, ...] = ()) -> Structure:
@@ -73,9 +52,9 @@ def girder_bridge(length_m: float) -> tuple[Structure, Array]:
         surfaces.append(rectangle(f"flange-{number}", (0.0, y, 9.0), (0, 0, -1), length_m, 0.5))
     surfaces.append(rectangle("soffit", (0.0, 0.0, 11.0), (0, 0, -1), length_m, 5.0))
     extra = [
-        points_on(rectangle("deck", (0.0, 0.0, 11.4), (0, 0, 1), length_m, 10.0)),
+        points_on(rectangle("deck", (0.0, 0.0, 11.4), (0, 0, 1), length_m, 10.0), SPACING_M),
         *(
-            points_on(rectangle("edge", (0.0, y, 11.2), (0, np.sign(y), 0), length_m, 0.4))
+            points_on(rectangle("edge", (0.0, y, 11.2), (0, np.sign(y), 0), length_m, 0.4), SPACING_M)
             for y in (-5.0, 5.0)
         ),
     ]
@@ -85,7 +64,7 @@ def girder_bridge(length_m: float) -> tuple[Structure, Array]:
                 rectangle(f"pier-{number}-{side}", (x + 0.6 * normal[0], 0.0, 4.5), normal, 6.0, 9.0)
             )
         for normal in ((0, -1, 0), (0, 1, 0)):
-            extra.append(points_on(rectangle("end", (x, 3.0 * normal[1], 4.5), normal, 1.2, 9.0)))
+            extra.append(points_on(rectangle("end", (x, 3.0 * normal[1], 4.5), normal, 1.2, 9.0), SPACING_M))
     clouds = [points_on(s, GROUND_SPACING_M if s.name.startswith("ground") else SPACING_M) for s in surfaces]
     points = np.concatenate([*clouds, *extra])
     stations = [
@@ -180,12 +159,13 @@ def _box_points(low: Array, high: Array) -> Array:
 
 def small_plan() -> FlightPlan:
     """A wall of 3 × 2 m, photographed."""
-    from tasks.planning.plan import plan
+    from tasks.planning.plan import plan_and_prove
 
     ground = rectangle("ground-01", (0.0, 0.0, 0.0), (0, 0, 1), 20.0, 20.0)
     wall = rectangle("wall-01", (0.0, 0.0, 4.0), (0, -1, 0), 3.0, 2.0)
-    points = np.concatenate([points_on(ground, GROUND_SPACING_M), points_on(wall)])
+    points = np.concatenate([points_on(ground, GROUND_SPACING_M), points_on(wall, SPACING_M)])
     camera = Camera(width_px=1632, height_px=1224, focal_px=4000.0)
     origin = GeoOrigin(latitude_deg=47.1234567, longitude_deg=8.7654321, altitude_m=412.0)
     settings = PlanSettings(gsd_mm_px=1.2, overlap=0.3, free_m=(OPEN,))
-    return plan(structure_of([ground, wall], points), points, camera, Vehicle(), origin, None, settings)
+    structure = structure_of([ground, wall], points)
+    return plan_and_prove(structure, points, camera, Vehicle(), origin, None, settings)[0]

@@ -42,11 +42,11 @@ def rectangle(
     )  # fmt: skip
 
 
-def points_on(surface: Surface) -> Array:
-    """(N, 3) points of a rectangle every 10 cm, its border included."""
+def points_on(surface: Surface, spacing_m: float = SPACING_M) -> Array:
+    """(N, 3) points of a rectangle every `spacing_m`, its border included."""
     u_low, v_low, u_high, v_high = surface.bounds_m
-    u = np.linspace(u_low, u_high, max(2, round((u_high - u_low) / SPACING_M) + 1))
-    v = np.linspace(v_low, v_high, max(2, round((v_high - v_low) / SPACING_M) + 1))
+    u = np.linspace(u_low, u_high, max(2, round((u_high - u_low) / spacing_m) + 1))
+    v = np.linspace(v_low, v_high, max(2, round((v_high - v_low) / spacing_m) + 1))
     return surface.to_world(np.stack(np.meshgrid(u, v), -1).reshape(-1, 2))
 
 

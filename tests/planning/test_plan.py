@@ -13,7 +13,7 @@ from schemas.mission import MOST_ITEMS, mission_items
 from schemas.problem import BadInput
 from schemas.settings import PlanSettings
 from schemas.vehicle import Vehicle
-from tasks.planning.plan import plan
+from tasks.planning.plan import plan_and_prove
 from tests.planning.structures import CAMERA, OPEN, ORIGIN, VEHICLE, World, box, bridge, rectangle, wall
 
 SETTINGS = PlanSettings(gsd_mm_px=1.0, overlap=0.5, free_m=(OPEN,))
@@ -26,7 +26,7 @@ def planned(
     vehicle: Vehicle = VEHICLE,
     home_m: Vector3 | None = None,
 ) -> FlightPlan:
-    return plan(world.structure, world.cloud, CAMERA, vehicle, ORIGIN, home_m, settings)
+    return plan_and_prove(world.structure, world.cloud, CAMERA, vehicle, ORIGIN, home_m, settings)[0]
 
 
 def nearest_m(made: FlightPlan, points: npt.NDArray[np.float64]) -> float:
@@ -232,4 +232,4 @@ def test_the_ground_can_be_inspected_when_named() -> None:
 def test_a_camera_whose_distortion_folds_its_image_is_refused() -> None:
     camera = CAMERA.model_copy(update={"focal_px": 900.0, "k1": -0.25})
     with pytest.raises(BadInput, match="distortion"):
-        plan(wall().structure, wall().cloud, camera, VEHICLE, ORIGIN, None, SETTINGS)
+        plan_and_prove(wall().structure, wall().cloud, camera, VEHICLE, ORIGIN, None, SETTINGS)
