@@ -1,7 +1,6 @@
 """What the report shows of a mosaic's photos: each with its fate, their match graph, how well they lie."""
 
 from dataclasses import dataclass
-from statistics import median
 
 import cv2
 import numpy as np
@@ -12,7 +11,7 @@ from artifacts.match_graph import match_graph
 from artifacts.mosaic_view import MosaicView, OpenFile
 from artifacts.uncertainty_map import sigma_mm, uncertainty_map
 from schemas.file import File
-from schemas.photo import Photo
+from schemas.photo import Photo, sharpness_shares
 
 THUMB_PX = 96
 THUMBS_BYTES, THUMB_BYTES = 3_000_000, 4_000  # of all and of each, as files
@@ -30,7 +29,7 @@ class PhotoRow:
     rms_px: float | None
     sigma_mm: float | None  # 1σ among the others, along the worst direction
     gain: float
-    sharpness: float  # of the median photo's
+    sharpness: float  # over the median photo's, where that is least
     camera_from: str
 
 
@@ -45,7 +44,6 @@ class PhotoPages:
 
 def photo_pages(view: MosaicView, open_file: OpenFile) -> PhotoPages:
     mosaic = view.mosaic
-    usual = median(photo.sharpness for photo in mosaic.photos) or 1.0
     budget = min(THUMB_BYTES, THUMBS_BYTES // len(mosaic.photos))
     rows = tuple(
         PhotoRow(
@@ -58,11 +56,11 @@ def photo_pages(view: MosaicView, open_file: OpenFile) -> PhotoPages:
             rms_px=placement.rms_px,
             sigma_mm=sigma_mm(placement),
             gain=placement.gain,
-            sharpness=photo.sharpness / usual,
+            sharpness=share,
             camera_from=_camera_from(photo),
         )
-        for number, (placement, photo) in enumerate(
-            zip(mosaic.placements, mosaic.photos, strict=True), start=1
+        for number, (placement, photo, share) in enumerate(
+            zip(mosaic.placements, mosaic.photos, sharpness_shares(mosaic.photos), strict=True), start=1
         )
     )
     return PhotoPages(
