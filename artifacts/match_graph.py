@@ -31,6 +31,7 @@ def match_graph(view: MosaicView) -> Markup:
     root = svg.drawing(
         max(width, 620.0), height + LEGEND, f"Match graph of the photos of {mosaic.name}", class_="graph"
     )
+    root.set("style", f"max-width:{svg.number(max(width, 620.0))}px")
     size = view.whole.reduced_size(round(width), round(height))
     picture = jpeg_uri(view.picture(view.whole, size), BUDGET)
     svg.add(
@@ -40,7 +41,7 @@ def match_graph(view: MosaicView) -> Markup:
     places = _places(mosaic)
     _draw_edges(root, mosaic, places, scale)
     _draw_photos(root, mosaic, places, scale)
-    _draw_legend(root, height + LEGEND - 7, mosaic, places)
+    _draw_legend(root, height + LEGEND - 7, mosaic)
     return svg.text_of(root)
 
 
@@ -82,17 +83,20 @@ def _draw_photos(
         )
         svg.add(dot, "title").text = svg.CONTROL.sub("", f"{placement.name}: {placement.status}")
         if len(places) <= MOST_LABELS:
-            svg.write(root, str(k + 1), x=x + 6, y=y - 5, font_size=11, fill=palette.INK, font_weight=600)
+            text = {"font_size": 11, "font_weight": 600, "fill": palette.INK, "stroke": "#ffffff"}
+            svg.write(root, str(k + 1), x=x + 6, y=y - 5, stroke_width=3, paint_order="stroke", **text)
 
 
-def _draw_legend(root: ElementTree.Element, y: float, mosaic: Mosaic, places: Mapping[int, object]) -> None:
+def _draw_legend(root: ElementTree.Element, y: float, mosaic: Mosaic) -> None:
     x = 4.0
     low = 0
     words = []
     for below, colour in SHADES:
         words.append((colour, f"{low}–{below - 1} matches" if below < 10**9 else f"{low} and more"))
         low = below
-    words += [(STATUS["solved"], "solved"), (STATUS["placed"], "placed by position alone")]
+    words.append((STATUS["solved"], "solved"))
+    if any(p.status == "placed" for p in mosaic.placements):
+        words.append((STATUS["placed"], "placed by position alone"))
     if any(not edge.held for edge in mosaic.edges):
         words.append((FALSE, "false match"))
     for colour, text in words:

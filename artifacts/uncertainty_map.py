@@ -48,6 +48,7 @@ def uncertainty_map(mosaic: Mosaic, open_file: OpenFile) -> Markup | None:
     root = svg.drawing(
         max(width, 560.0), height + LEGEND, f"Position uncertainty over the mosaic of {mosaic.name}"
     )
+    root.set("style", f"max-width:{svg.number(max(width, 560.0))}px")
     picture = _png(levels[np.minimum(_sources(mosaic, open_file, size), len(sigmas))])
     svg.add(root, "image", href=picture, x=0, y=0, width=width, height=height, preserveAspectRatio="none")
     frame = {"fill": "none", "stroke": palette.FAINT, "stroke_width": 0.8}
@@ -57,7 +58,7 @@ def uncertainty_map(mosaic: Mosaic, open_file: OpenFile) -> Markup | None:
     svg.add(root, "image", href=_png(np.arange(2, 2 + STEPS, dtype=np.uint8)[None]), x=62, y=y - 9, width=BAR,
             height=10, preserveAspectRatio="none")  # fmt: skip
     svg.write(root, f"{high:.2g} mm (1σ)", x=68 + BAR, y=y, font_size=11.5, fill=palette.INK)
-    if (levels[1:] == 1).any():
+    if any(p.status == "placed" for p in mosaic.placements):
         svg.add(root, "rect", x=180 + BAR, y=y - 8, width=11, height=9, rx=2, fill=STATED_ALONE)
         svg.write(root, "placed by position alone", x=195 + BAR, y=y, font_size=11.5, fill=palette.INK)
     return svg.text_of(root)
