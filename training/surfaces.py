@@ -261,12 +261,15 @@ def _pores(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
 def _things(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
     """What lies on top: cables, chalk, markers, scratches."""
     shapes: list[Shapes] = []
-    for _ in range(rng.poisson(0.35)):  # a cable or wire, its shadow beside it
+    for _ in range(rng.poisson(0.35)):  # a cable or wire: round, so it shines along one side; its shadow
         start, end = _through(rng, side_m, rng.uniform(0, np.pi))
-        bow, wide = rng.normal(0, 0.04) * side_m, rng.uniform(1.0, 9.0) * px_m
+        bow, wide = rng.normal(0, 0.04) * side_m, rng.uniform(1.5, 9.0) * px_m
+        across = np.array([-(end - start)[1], (end - start)[0]]) / np.linalg.norm(end - start) * wide
         shapes.append(_straight(start, end, wide, float(rng.uniform(0.08, 0.5)), bow))
+        shine = rng.uniform(-0.35, 0.35) * across
+        shapes.append(_straight(start + shine, end + shine, 0.3 * wide, float(rng.uniform(1.2, 4.0)), bow))
         if rng.random() < 0.4:
-            off = rng.uniform(1.2, 4.0) * wide * np.array([1.0, -1.0])
+            off = rng.uniform(1.2, 4.0) * across
             shapes.append(_straight(start + off, end + off, wide, float(rng.uniform(0.5, 0.8)), bow))
     for _ in range(rng.poisson(0.5)):  # chalk and scratches: bright, and wandering like a crack
         mark = _crack(rng, rng.uniform(0, side_m, 2), rng.uniform(0, 2 * np.pi), side_m, px_m)
