@@ -113,7 +113,7 @@ def main() -> None:
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
-            total += float(loss)
+            total += float(loss.detach())
             keep = min(AVERAGED, (1 + step) / (10 + step))
             with torch.no_grad():
                 for mine, new in zip(averaged.state_dict().values(), net.state_dict().values(), strict=True):
