@@ -30,7 +30,7 @@ from tasks.simulation.task import photograph, photograph_wall, start_vehicle
 # Where a plan is anchored when the inspection gives no origin: the home of ArduPilot's own simulator, so
 # that the mission can be rehearsed there but nobody takes it for a real place.
 REHEARSAL_ORIGIN = GeoOrigin(latitude_deg=-35.363262, longitude_deg=149.165237, altitude_m=584.0)
-PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".tif", ".tiff"}
+PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif"}
 
 
 @dataclass(frozen=True)

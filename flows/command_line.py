@@ -116,17 +116,24 @@ def serve(*, port: int = 4200, report_port: int = 4201) -> int:
     return serve_everything(port, report_port)
 
 
+def add_commands() -> None:
+    """Each module adds its commands to the app as it is imported."""
+    import flows.calibrate_command
+    import flows.evaluate_command
+    import flows.flight_commands
+    import flows.photo_commands
+    import flows.plan_command
+    import flows.structure_commands
+    import flows.watch_command  # noqa: F401
+
+
 def main() -> None:
     """Entry point: one clear message for what a user can mend, never a bare traceback."""
     os.environ.setdefault("PREFECT_LOGGING_LEVEL", "CRITICAL")
     os.environ.setdefault("PREFECT_SERVER_LOGGING_LEVEL", "CRITICAL")  # it logs tracebacks when it is stopped
     os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
     os.environ.setdefault("DO_NOT_TRACK", "1")
-    import flows.evaluate_command  # each adds its commands to the app
-    import flows.flight_commands
-    import flows.photo_commands
-    import flows.plan_command
-    import flows.structure_commands  # noqa: F401
+    add_commands()
 
     try:
         result: Any = app(exit_on_error=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 import yaml
 from pydantic import ValidationError
 
-from schemas.inspection import Inspection
+from schemas.inspection import CameraInput, Inspection
 from schemas.problem import BadInput
 
 
@@ -27,8 +27,33 @@ def read_inspection(path: Path) -> Inspection:
         ) from None
     if not isinstance(content, dict):
         raise BadInput(str(path), "holds no settings", "Write one with: hairline init FOLDER")
+    if isinstance(content.get("camera"), str):
+        content["camera"] = read_camera_file(existing(path.parent, content["camera"], "camera")).model_dump()
     try:
         return Inspection.model_validate(content)
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
+
+
+def read_camera_file(path: Path) -> CameraInput:
+    """CAMERA.yaml: width_px, height_px, and focal_px or focal_mm with sensor_width_mm; lens, k1…, shutter_s.
+    An inspection file that has a camera does too."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError:
+        raise BadInput(
+            str(path), "cannot be read", "Give a YAML file with width_px, height_px, focal_px"
+        ) from None
+    except (yaml.YAMLError, UnicodeDecodeError):
+        raise BadInput(
+            str(path), "is not valid YAML", "Write width_px, height_px and focal_px in it"
+        ) from None
+    if isinstance(content, dict) and "camera" in content:
+        content = content["camera"]
+    if isinstance(content, str):
+        return read_camera_file(existing(path.parent, content, "camera"))
+    try:
+        return CameraInput.model_validate(content)
     except ValidationError as problem:
         raise explain(str(path), problem) from None
 

@@ -5,15 +5,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-import yaml
 from cyclopts import Parameter
 from pydantic import BaseModel, ValidationError
 
 from flows.console import StageLines, err
 from flows.console import out as console
-from flows.inspection_file import explain
+from flows.inspection_file import explain, read_camera_file
 from schemas.camera import Camera
-from schemas.inspection import CameraInput
 from schemas.problem import BadInput, LeftOut
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -59,22 +57,7 @@ def read_contract(path: Path, contract: type[Model]) -> Model:
 
 def read_camera(path: Path) -> Camera:
     """CAMERA.yaml: width_px, height_px, and focal_px or focal_mm with sensor_width_mm; k1…, shutter_s."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError:
-        raise BadInput(
-            str(path), "cannot be read", "Give a YAML file with width_px, height_px, focal_px"
-        ) from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise BadInput(
-            str(path), "is not valid YAML", "Write width_px, height_px and focal_px in it"
-        ) from None
-    try:
-        return CameraInput.model_validate(
-            content.get("camera", content) if isinstance(content, dict) else content
-        ).camera()
-    except ValidationError as problem:
-        raise explain(str(path), problem) from None
+    return read_camera_file(path).camera()
 
 
 def one_by_one(

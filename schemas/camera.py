@@ -1,10 +1,13 @@
-"""The camera: a pinhole with Brown distortion, and the pose it takes a photo from."""
+"""The camera: a pinhole behind a lens, and the pose it takes a photo from."""
+
+from typing import Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from schemas.contract import Contract, Vector3
+from schemas.distortion import Brown, Distortion, Fisheye
 
 Array = npt.NDArray[np.float64]
 
@@ -42,11 +45,13 @@ class Camera(Contract):
     focal_px: PositiveFloat
     cx_px: float | None = None  # principal point; None: the image's centre
     cy_px: float | None = None
-    k1: float = 0.0  # Brown distortion as OpenCV orders it: k1, k2, p1, p2, k3
+    lens: Literal["brown", "fisheye"] = "brown"  # which model the coefficients belong to (schemas/distortion)
+    k1: float = 0.0
     k2: float = 0.0
-    p1: float = 0.0
+    p1: float = 0.0  # of brown alone
     p2: float = 0.0
     k3: float = 0.0
+    k4: float = 0.0  # of fisheye alone
     shutter_s: float = Field(default=1 / 1000, gt=0)  # exposure time, bounds the speed by motion blur
     max_rate_hz: float = Field(default=1.0, gt=0)  # photos a second that it can store
     f_number: float | None = Field(default=None, gt=0)  # aperture, with pixel_um: what is in focus
@@ -69,9 +74,21 @@ class Camera(Contract):
         cx, cy = self.principal_px
         return np.array([[self.focal_px, 0.0, cx], [0.0, self.focal_px, cy], [0.0, 0.0, 1.0]])
 
+    @model_validator(mode="after")
+    def _coefficients_of_its_lens(self) -> Self:
+        check_lens(self.lens, self.p1, self.p2, self.k4)
+        return self
+
     @property
-    def distortion(self) -> tuple[float, float, float, float, float]:
-        return (self.k1, self.k2, self.p1, self.p2, self.k3)
+    def distortion(self) -> Distortion:
+        if self.lens == "fisheye":
+            return Fisheye(self.k1, self.k2, self.k3, self.k4)
+        return Brown(self.k1, self.k2, self.p1, self.p2, self.k3)
+
+    @property
+    def is_ideal(self) -> bool:
+        """Photos need no undistortion."""
+        return self.lens == "brown" and not any((self.k1, self.k2, self.p1, self.p2, self.k3))
 
     def gsd_mm_px(self, distance_m: float) -> float:
         """Ground sample distance of a surface seen perpendicularly from `distance_m`."""
@@ -94,24 +111,12 @@ class Camera(Contract):
         return self.width_px * gsd_m, self.height_px * gsd_m
 
     def distort(self, xy: npt.ArrayLike) -> Array:
-        """(N, 2) distorted from (N, 2) ideal normalised image coordinates (Brown)."""
-        x, y = np.asarray(xy, dtype=float).T
-        r2 = x * x + y * y
-        radial = 1 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
-        return np.column_stack(
-            [
-                x * radial + 2 * self.p1 * x * y + self.p2 * (r2 + 2 * x * x),
-                y * radial + self.p1 * (r2 + 2 * y * y) + 2 * self.p2 * x * y,
-            ]
-        )
+        """(N, 2) distorted from (N, 2) ideal normalised image coordinates."""
+        return self.distortion.distort(np.asarray(xy, dtype=float))
 
     def undistort(self, xy: npt.ArrayLike) -> Array:
-        """(N, 2) ideal normalised coordinates of (N, 2) distorted ones, by fixed-point iteration."""
-        distorted = np.asarray(xy, dtype=float)
-        ideal = distorted.copy()
-        for _ in range(20):
-            ideal = ideal + (distorted - self.distort(ideal))
-        return ideal
+        """(N, 2) ideal normalised coordinates of (N, 2) distorted ones; NaN where the lens sends no ray."""
+        return self.distortion.undistort(np.asarray(xy, dtype=float))
 
     def project(self, points_m: npt.ArrayLike, pose: CameraPose) -> Array:
         """(N, 2) pixels of (N, 3) world points; NaN for those behind the camera."""
@@ -125,3 +130,11 @@ class Camera(Contract):
         xy = self.undistort((px - self.principal_px) / self.focal_px)
         rays = np.column_stack([xy, np.ones(len(xy))]) @ pose.R_world_camera.T
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+
+def check_lens(lens: str, p1: float, p2: float, k4: float) -> None:
+    """Raises ValueError where coefficients belong to the other lens."""
+    if lens == "fisheye" and (p1 or p2):
+        raise ValueError("p1 and p2 belong to lens brown, a fisheye has k1 to k4")
+    if lens == "brown" and k4:
+        raise ValueError("k4 belongs to lens fisheye, brown has k1 to k3, p1 and p2")

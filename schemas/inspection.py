@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.camera import Camera
+from schemas.camera import Camera, check_lens
 from schemas.contract import Contract, Matrix4, Vector3
 from schemas.geodesy import GeoOrigin
 from schemas.scanning import Scanning
@@ -32,11 +32,13 @@ class CameraInput(Contract):
     sensor_width_mm: float | None = Field(default=None, gt=0)
     cx_px: float | None = None
     cy_px: float | None = None
+    lens: Literal["brown", "fisheye"] = "brown"
     k1: float = 0.0
     k2: float = 0.0
     p1: float = 0.0
     p2: float = 0.0
     k3: float = 0.0
+    k4: float = 0.0
     shutter_s: float = Field(default=1 / 1000, gt=0)
     max_rate_hz: float = Field(default=1.0, gt=0)
     f_number: float | None = Field(default=None, gt=0)
@@ -48,6 +50,7 @@ class CameraInput(Contract):
         by_lens = self.focal_mm is not None and self.sensor_width_mm is not None
         if by_lens == (self.focal_px is not None):
             raise ValueError("give either focal_px, or focal_mm together with sensor_width_mm")
+        check_lens(self.lens, self.p1, self.p2, self.k4)
         return self
 
     def camera(self) -> Camera:

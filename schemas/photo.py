@@ -4,6 +4,9 @@ from schemas.camera import Camera, CameraPose
 from schemas.contract import Contract, Vector3
 from schemas.file import File
 
+BLURRED = 0.3  # of the median sharpness: scenes differ by a fifth, 4 px of blur by four to ten
+LOST = 0.5  # share of a photo that is clipped: real photos of structures have at most a few hundredths
+
 
 class Photo(Contract):
     name: str  # the file's name, unique in its set
@@ -18,8 +21,17 @@ class Photo(Contract):
     surface: str  # the surface (or set) it belongs to
     sharpness: float  # variance of the Laplacian over that of local contrast, dimensionless; blur lowers it
     exposure: float  # mean grey, 0..1
+    white: float = 0.0  # share of pixels that are white through and through, and
+    black: float = 0.0  # that are black: their brightness is lost
     metered_ev: float | None = None  # log2 of s · ISO / 100 / f-number², from EXIF: the light it was set for
     orientation: int = 1  # EXIF orientation, already undone in `file` and `camera`
+
+    @property
+    def misexposed(self) -> str | None:
+        """Why nothing can be seen in it, where that is so."""
+        if self.white > LOST:
+            return f"overexposed ({self.white:.0%} of it is white)"
+        return f"underexposed ({self.black:.0%} of it is black)" if self.black > LOST else None
 
 
 class Features(Contract):

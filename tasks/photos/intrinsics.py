@@ -8,7 +8,7 @@ from tasks.photos.metadata import Metadata
 
 _FULL_FRAME_DIAGONAL_MM = math.hypot(36.0, 24.0)
 # Quarter turns (clockwise) that make a photo upright, by EXIF orientation (2, 4, 5, 7 mirror as well).
-_QUARTER_TURNS = {3: 2, 5: 1, 6: 1, 7: 1, 8: 3}
+QUARTER_TURNS = {3: 2, 5: 1, 6: 1, 7: 1, 8: 3}
 
 
 def camera_of_photo(camera: Camera, width_px: int, height_px: int, orientation: int, name: str) -> Camera:
@@ -16,7 +16,7 @@ def camera_of_photo(camera: Camera, width_px: int, height_px: int, orientation: 
 
     Raises BadInput where the photo has another shape than the camera: it comes from another camera."""
     turned = camera
-    for _ in range(_QUARTER_TURNS.get(orientation, 0)):
+    for _ in range(QUARTER_TURNS.get(orientation, 0)):
         turned = _turn(turned)
     if (turned.width_px > turned.height_px) != (width_px > height_px) and orientation == 1:
         turned = _turn(turned)  # stored upright by other software, its orientation forgotten

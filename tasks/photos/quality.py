@@ -8,6 +8,8 @@ from tasks.photos.reading import Pixels
 SHRINK = 4  # measured on a copy so much smaller: a blurred photo keeps its sensor noise, this takes it out
 AROUND_PX = 8.0  # of the copy: contrast on larger scales is light and shade, and says nothing of sharpness
 
+WHITE, BLACK = 253, 2  # JPEG moves clipped values by one or two
+
 
 def sharpness(pixels: Pixels) -> float:
     """Variance of the Laplacian over the variance of local contrast, on a copy of a quarter of the size.
@@ -24,3 +26,10 @@ def sharpness(pixels: Pixels) -> float:
 def exposure(pixels: Pixels) -> float:
     """Mean grey, 0..1."""
     return float(np.mean(cv2.mean(pixels)[:3])) / 255.0
+
+
+def clipped(pixels: Pixels) -> tuple[float, float]:
+    """Shares of pixels that are white and that are black in every channel."""
+    red, green, blue = cv2.split(pixels)
+    least, most = cv2.min(cv2.min(red, green), blue), cv2.max(cv2.max(red, green), blue)
+    return float(np.mean(least >= WHITE)), float(np.mean(most <= BLACK))

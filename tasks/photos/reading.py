@@ -12,10 +12,11 @@ from schemas.problem import BadInput
 
 Pixels = npt.NDArray[np.uint8]
 
-FORMATS = ("JPEG", "PNG", "TIFF")
+FORMATS = ("JPEG", "PNG", "TIFF", "HEIF")
 SMALLEST_PX = 32  # per side; less is an icon, not a photo
 LARGEST_PX = 32_000  # per side; OpenCV's remap fails from 32,767
-REMEDY = "Give a JPEG, PNG or TIFF photo, or take this file out of the folder"
+REMEDY = "Give a JPEG, PNG, TIFF or HEIC photo, or take this file out of the folder"
+HEIC_BRANDS = (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")  # ISO 23008-12, at byte 8
 
 Image.MAX_IMAGE_PIXELS = 600_000_000  # Pillow's own limit refuses cameras of more than 179 MP
 
@@ -37,8 +38,9 @@ def read_photo(path: Path, name: str) -> Decoded:
     """Raises BadInput: not an image, truncated, too small, too large, or of no photographic kind."""
     if path.stat().st_size == 0:
         raise BadInput(name, "the file is empty (0 bytes)", REMEDY)
+    formats = FORMATS if _is_heic(path) and _heic_is_readable(name) else FORMATS[:-1]
     try:
-        with Image.open(path, formats=FORMATS) as image:
+        with Image.open(path, formats=formats) as image:
             _check_size(image, name)
             exif = image.getexif()
             xmp = image.info.get("xmp", b"")
@@ -57,6 +59,26 @@ def read_photo(path: Path, name: str) -> Decoded:
     except _DAMAGE as error:
         raise BadInput(name, f"is damaged ({error})", "Copy it again from the camera's card") from None
     return Decoded(pixels, orientation, plain, exif, xmp if isinstance(xmp, bytes) else xmp.encode())
+
+
+def _is_heic(path: Path) -> bool:
+    with path.open("rb") as file:
+        head = file.read(12)
+    return head[4:8] == b"ftyp" and head[8:] in HEIC_BRANDS
+
+
+def _heic_is_readable(name: str) -> bool:
+    """Raises BadInput where the optional package is absent."""
+    try:
+        import pillow_heif
+    except ImportError:
+        raise BadInput(
+            name,
+            "is a HEIC photo, and the package that reads these is not installed",
+            "Type: pip install pillow-heif; or let the camera write JPEG",
+        ) from None
+    pillow_heif.register_heif_opener()
+    return True
 
 
 def _check_size(image: Image.Image, name: str) -> None:

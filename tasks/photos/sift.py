@@ -42,15 +42,16 @@ def detect_features(grey: npt.NDArray[np.uint8], camera: Camera, most: int) -> K
         return Keypoints(np.zeros((0, 2), np.float32), empty, empty, empty, np.zeros((0, 128), np.uint8))
     step = np.array([width / small.shape[1], height / small.shape[0]])
     pixels = (np.array([k.pt for k in found]) + 0.5) * step - 0.5
-    if any(camera.distortion):
+    if not camera.is_ideal:
         ideal = camera.undistort((pixels - camera.principal_px) / camera.focal_px)
         pixels = ideal * camera.focal_px + camera.principal_px
+    lit = np.isfinite(pixels).all(axis=1)  # a fisheye's corners may show no ray
     return Keypoints(
-        xy=pixels.astype(np.float32),
-        scale=(np.array([k.size for k in found]) * step.mean()).astype(np.float32),
-        angle=np.array([k.angle for k in found], np.float32),
-        response=np.array([k.response for k in found], np.float32),
-        descriptors=_root(np.asarray(descriptors, np.float32)),
+        xy=pixels[lit].astype(np.float32),
+        scale=(np.array([k.size for k in found])[lit] * step.mean()).astype(np.float32),
+        angle=np.array([k.angle for k in found], np.float32)[lit],
+        response=np.array([k.response for k in found], np.float32)[lit],
+        descriptors=_root(np.asarray(descriptors, np.float32)[lit]),
     )
 
 

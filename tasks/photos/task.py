@@ -1,18 +1,28 @@
 """Stages: check and understand each photo; find its features."""
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
 import cv2
 import numpy as np
+import numpy.typing as npt
 from PIL import Image
 
 from artifacts import store
+from schemas.arrival import Arrival
 from schemas.assigned_shot import AssignedShot
+from schemas.calibration import Calibration
 from schemas.camera import Camera, CameraPose
 from schemas.file import File
 from schemas.flight_log import FlightLog
+from schemas.flight_plan import FlightPlan
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput
 from schemas.settings import StitchSettings
 from tasks.stage import stage
+
+Charuco = tuple[tuple[int, int], str, float]  # squares across and down, dictionary, marker over square
 
 
 @stage()
@@ -27,7 +37,7 @@ def ingest(
     """Decode, set upright, measure; camera from EXIF where none is given. Raises BadInput by name."""
     from tasks.photos.intrinsics import camera_from_metadata, camera_of_photo
     from tasks.photos.metadata import read_metadata
-    from tasks.photos.quality import exposure, sharpness
+    from tasks.photos.quality import clipped, exposure, sharpness
     from tasks.photos.reading import read_photo
 
     decoded = read_photo(store.current().path(file), name)
@@ -38,6 +48,7 @@ def ingest(
     else:
         camera = camera_of_photo(camera, width_px, height_px, decoded.orientation, name)
         camera_from, focal_sigma = "inspection", 0.01
+    white, black = clipped(decoded.pixels)
     if not decoded.as_it_came:
         with store.current().scratch() as folder:
             Image.fromarray(decoded.pixels).save(folder / "upright.png", compress_level=3)
@@ -56,6 +67,8 @@ def ingest(
         sharpness=sharpness(decoded.pixels),
         exposure=exposure(decoded.pixels),
         orientation=decoded.orientation,
+        white=white,
+        black=black,
         metered_ev=metadata.metered_ev,
     )
 
@@ -83,3 +96,26 @@ def features(photo: Photo, settings: StitchSettings) -> Features:
         write_features(keypoints, folder / "features.npz")
         entered = store.current().put(folder / "features.npz")
     return Features(photo=photo.name, file=entered, count=len(keypoints.xy))
+
+
+def calibrate(
+    paths: Sequence[Path], lens: Literal["brown", "fisheye"], charuco: Charuco | None
+) -> tuple[Calibration, npt.NDArray[np.uint8]]:
+    """The camera that took these photos of a board, and a picture of what it rests on, (H, W, 3) RGB; no
+    stage: only the command line asks for it. charuco: None for a chessboard."""
+    from tasks.photos.boards import charuco_finder, find_chessboards
+    from tasks.photos.calibrate import calibrate as calibrated
+    from tasks.photos.picture import draw_calibration
+
+    find = find_chessboards if charuco is None else charuco_finder(*charuco)
+    made = calibrated([(path.name, path) for path in paths], find, lens)
+    return made, draw_calibration(made)
+
+
+def judge(photos: Sequence[Photo], plan: FlightPlan | None) -> tuple[tuple[Arrival, ...], tuple[str, ...]]:
+    """What each photo so far is good for, and the plan's shooting points that have no good photo yet; no
+    stage: it is asked while photos arrive."""
+    from tasks.photos.arrival import judged, missing
+
+    arrivals = judged(photos, plan)
+    return arrivals, missing(arrivals, plan) if plan else ()

@@ -182,9 +182,23 @@ def _optics(camera: Camera) -> tuple[tuple[float, ...], float]:
     corners = np.array([(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)])
     ideal = camera.undistort((corners - camera.principal_px) / camera.focal_px)
     size = float(camera.width_px), float(camera.height_px)
-    return (camera.focal_px, cx, cy, *size, *camera.distortion), float((ideal**2).sum(axis=1).max()) * (
-        1 + 1e-6
-    )
+    lens = (camera.k1, camera.k2, camera.p1, camera.p2, camera.k3, camera.k4, float(camera.lens == "fisheye"))
+    return (camera.focal_px, cx, cy, *size, *lens), float((ideal**2).sum(axis=1).max()) * (1 + 1e-6)
+
+
+@njit(cache=True)
+def _radial(r2, k1, k2, k3, k4, fisheye):  # type: ignore[no-untyped-def]
+    """Distorted over ideal distance from the principal point, and for a fisheye its slope by that distance,
+    over the distance (schemas/distortion.py)."""
+    if not fisheye:
+        return 1 + r2 * (k1 + r2 * (k2 + r2 * k3)), 0.0
+    if r2 < 1e-8:
+        return 1.0, 2 * (k1 - 1 / 3)
+    t = np.arctan(np.sqrt(r2))
+    t2 = t * t
+    radial = t / np.sqrt(r2) * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
+    by_t = 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
+    return radial, (by_t / (1 + r2) - radial) / r2
 
 
 @njit(cache=True)
@@ -206,8 +220,8 @@ def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def
     r2 = x * x + y * y
     if r2 > widest:
         return False, 0.0, np.inf
-    f, cx, cy, width, height, k1, k2, p1, p2, k3 = optics
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    f, cx, cy, width, height, k1, k2, p1, p2, k3, k4, fisheye = optics
+    radial, bend = _radial(r2, k1, k2, k3, k4, fisheye)
     column = f * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx + 0.5
     row = f * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy + 0.5
     inside = 0 <= column <= width and 0 <= row <= height
@@ -217,6 +231,11 @@ def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def
     slope = -z / towards
     ax, ay, az = z + slope * nx * x, slope * nx * y, slope * nx
     bx, by, bz = slope * ny * x, z + slope * ny * y, slope * ny
+    if fisheye:  # its pixels' rays are not those of an ideal lens: (radial·I + bend·x xᵀ)⁻¹ to the right
+        share = bend / (radial + bend * r2)
+        tx, ty, tz = share * (ax * x + bx * y), share * (ay * x + by * y), share * (az * x + bz * y)
+        ax, ay, az = (ax - tx * x) / radial, (ay - ty * x) / radial, (az - tz * x) / radial
+        bx, by, bz = (bx - tx * y) / radial, (by - ty * y) / radial, (bz - tz * y) / radial
     aa, bb, ab = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, ax * bx + ay * by + az * bz
     largest = (aa + bb) / 2 + np.sqrt(((aa - bb) / 2) ** 2 + ab * ab)
     return inside, -towards / np.sqrt(r2 + 1), np.sqrt(largest) * 1000 / f

@@ -49,7 +49,7 @@ def check_camera(camera: Camera) -> None:
     if not unfolded:
         raise BadInput(
             "camera",
-            "no ray leads to the corners of its image: its distortion (k1, k2, p1, p2, k3) cannot be right",
+            "no ray leads to the corners of its image: its distortion (k1, k2, …) cannot be right",
             "Calibrate it again, or leave the distortion out.",
         )
 

@@ -1,6 +1,6 @@
 """The bundle: cameras above a plane, points on it, where the photos show them, and what is known before.
 
-Residuals are pixels of the photos as taken, through the full Brown model."""
+Residuals are pixels of the photos as taken, through the full model of the lens."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -72,7 +72,7 @@ def build_bundle(
     when = np.zeros(len(xy))
     for k, view in enumerate(views):
         mine = observations.photo == k
-        if any(view.camera.distortion):
+        if not view.camera.is_ideal:
             principal = np.asarray(view.camera.principal_px)
             ideal = (xy[mine] - principal) / view.camera.focal_px
             xy[mine] = view.camera.distort(ideal) * view.camera.focal_px + principal
@@ -172,25 +172,17 @@ class Jacobians:
 def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
     xy, p = _ideal(state, bundle)
     x, y = xy.T
-    r2 = x * x + y * y
     of = bundle.camera_of[bundle.photo]
-    k1 = state.k1[of]
-    k2, p1, p2, k3 = np.array([c.distortion[1:] for c in bundle.cameras])[of].T
     focal = (np.array([c.focal_px for c in bundle.cameras]) * np.exp(state.log_focal))[of]
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))  # of radial by x, over x
-    distorted = np.stack(
-        [
-            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-        ],
-        axis=1,
-    )
-    cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
-    by_ideal = np.empty((len(x), 2, 2))
-    by_ideal[:, 0, 0] = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
-    by_ideal[:, 0, 1] = by_ideal[:, 1, 0] = cross
-    by_ideal[:, 1, 1] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+    distorted, by_k1, by_ideal = np.empty_like(xy), np.empty_like(xy), np.empty((len(x), 2, 2))
+    for c, nominal in enumerate(bundle.cameras):
+        mine = of == c
+        lens = with_lens(nominal, nominal.focal_px, float(state.k1[c])).distortion
+        distorted[mine], by_k1[mine], by_ideal[mine] = (
+            lens.distort(xy[mine]),
+            lens.by_k1(xy[mine]),
+            lens.slope(xy[mine]),
+        )
     zero, inverse = np.zeros(len(x)), 1.0 / p[:, 2]
     projection = np.stack([inverse, zero, -x * inverse, zero, inverse, -y * inverse], axis=1).reshape(
         -1, 2, 3
@@ -205,6 +197,6 @@ def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
     residual = focal[:, None] * distorted + principal + state.roll[bundle.photo] * bundle.rolled[:, None]
     return residual - bundle.xy, Jacobians(
         pose=np.concatenate([by_camera @ turning, -moving, rolling], axis=2),
-        lens=focal[:, None, None] * np.stack([distorted, xy * r2[:, None]], axis=2),
+        lens=focal[:, None, None] * np.stack([distorted, by_k1], axis=2),
         point=np.ascontiguousarray(moving[:, :, :2]),
     )

@@ -7,12 +7,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from schemas.photo import Photo
+from schemas.photo import BLURRED, Photo
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.prior import PlaneFrame, Prior
 from tasks.stitching.view import Array, View
 
-BLURRED = 0.3  # of the median sharpness: scenes differ by a fifth, 4 px of blur by four to ten
 STRONG = 0.02 / 3  # response of a feature that is no noise
 TEXTURED = 200  # strong features that a photo has for sure when it could have been matched
 OVERLAP = 0.3  # share of a photo that solved ones must cover, before not matching them speaks against it
@@ -32,7 +31,7 @@ class Fate:
 
 
 def unusable(photos: Sequence[Photo], min_sharpness: float | None) -> dict[int, str]:
-    """Photos that are not even matched, and why: blurred, or the same file twice."""
+    """Photos that are not even matched, and why: blurred, clipped, or the same file twice."""
     reasons: dict[int, str] = {}
     median = float(np.median([p.sharpness for p in photos]))
     least = BLURRED * median if min_sharpness is None else min_sharpness
@@ -41,6 +40,8 @@ def unusable(photos: Sequence[Photo], min_sharpness: float | None) -> dict[int, 
         twin = first.setdefault(photo.file.sha256, photo.name)
         if twin != photo.name:
             reasons[i] = f"the same picture as {twin}"
+        elif photo.misexposed:
+            reasons[i] = photo.misexposed
         elif photo.sharpness < least and photo.exposure > 0.0:
             share = f"sharpness {photo.sharpness:.3g}, its neighbours' median {median:.3g}"
             reasons[i] = f"blurred ({share})"

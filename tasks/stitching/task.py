@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 REMEDY = {
     "blurred": "Shoot it again, slower or with a shorter exposure",
     "the same": "Nothing to do",
+    "overexposed": "Shoot it again with a shorter exposure",
+    "underexposed": "Shoot it again with a longer exposure",
 }
 
 

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from flows.inspection_file import existing, read_inspection
+from flows.inspection_file import existing, read_camera_file, read_inspection
+from schemas.camera import Camera
 from schemas.problem import BadInput
 
 
@@ -59,3 +60,20 @@ def test_a_file_that_is_absent_binary_or_a_folder_is_named(tmp_path: Path) -> No
 def test_a_path_that_does_not_exist_names_its_key(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="named by key 'scans'"):
         existing(tmp_path, "scan.ply", "scans")
+
+
+def test_the_camera_may_be_a_file_beside(tmp_path: Path) -> None:
+    (tmp_path / "camera.yaml").write_text(
+        "width_px: 400\nheight_px: 300\nlens: fisheye\nfocal_px: 250\nk4: 0.001\n"
+    )
+    (tmp_path / "inspection.yaml").write_text("name: a\ncamera: camera.yaml\n")
+    given = read_inspection(tmp_path / "inspection.yaml").camera
+    assert given is not None
+    assert given.camera() == Camera(width_px=400, height_px=300, lens="fisheye", focal_px=250, k4=0.001)
+    assert read_camera_file(tmp_path / "inspection.yaml") == given
+    (tmp_path / "camera.yaml").write_text("width_px: 400\nheight_px: 300\nfocal_px: 250\nk4: 0.001\n")
+    with pytest.raises(BadInput, match=r"camera\.yaml: .*k4 belongs to lens fisheye"):
+        read_inspection(tmp_path / "inspection.yaml")
+    (tmp_path / "camera.yaml").write_text("width_px: 400\nfocal_px: 250\n")
+    with pytest.raises(BadInput, match="key 'height_px' is missing"):
+        read_inspection(tmp_path / "inspection.yaml")

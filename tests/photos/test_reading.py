@@ -1,15 +1,21 @@
 """Every kind of file that a folder of photos may hold: read right, or refused by name."""
 
+import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
+import tifffile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from artifacts import store
 from schemas.problem import BadInput
+from tasks.photos.metadata import read_metadata
 from tasks.photos.reading import read_photo
+from tasks.photos.task import ingest
 
 
 def gradient(width: int = 96, height: int = 64) -> np.ndarray:
@@ -74,6 +80,58 @@ def test_cmyk_is_converted(tmp_path: Path) -> None:
     decoded = read_photo(tmp_path / "print.jpg", "print.jpg")
     assert np.abs(decoded.pixels.astype(int) - gradient()).mean() < 4
     assert not decoded.as_it_came
+
+
+def test_heic_is_read_as_it_is_shown(tmp_path: Path) -> None:
+    pillow_heif = pytest.importorskip("pillow_heif", reason="the optional extra heic is not installed")
+    pillow_heif.register_heif_opener()
+    exif = Image.Exif()
+    exif[0x0112] = 6  # not counted in HEIC (ISO 23008-12): its own boxes turn it, in libheif
+    exif.get_ifd(0x8769)[0x920A] = 4.25
+    Image.fromarray(gradient()).save(tmp_path / "phone.heic", quality=95, exif=exif)
+    decoded = read_photo(tmp_path / "phone.heic", "phone.heic")
+    assert np.abs(decoded.pixels.astype(int) - gradient()).mean() < 6
+    assert not decoded.as_it_came
+    assert read_metadata(decoded.exif, decoded.xmp).focal_mm == 4.25
+
+
+def test_heic_without_its_package_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pillow_heif", None)
+    (tmp_path / "phone.jpg").write_bytes(b"\x00\x00\x00\x24ftypheic" + bytes(200))  # the suffix is no matter
+    with pytest.raises(BadInput, match="HEIC") as caught:
+        read_photo(tmp_path / "phone.jpg", "phone.jpg")
+    assert "pip install pillow-heif" in caught.value.remedy
+
+
+def test_the_suffix_is_no_matter_and_neither_is_progressive_storage(tmp_path: Path) -> None:
+    rgb = gradient()
+    Image.fromarray(rgb).save(tmp_path / "really-a-png.jpg", format="PNG")
+    Image.fromarray(rgb).save(tmp_path / "progressive.jpg", quality=98, progressive=True)
+    np.testing.assert_array_equal(read_photo(tmp_path / "really-a-png.jpg", "p").pixels, rgb)
+    assert np.abs(read_photo(tmp_path / "progressive.jpg", "q").pixels.astype(int) - rgb).max() <= 6
+
+
+def test_sixteen_bit_colour_keeps_its_brightness(tmp_path: Path) -> None:
+    rgb = gradient()
+    deep = rgb.astype(np.uint16) * 257
+    tifffile.imwrite(tmp_path / "deep.tif", deep, photometric="rgb")
+    cv2.imwrite(str(tmp_path / "deep.png"), deep[..., ::-1])
+    for name in ("deep.tif", "deep.png"):
+        decoded = read_photo(tmp_path / name, name)
+        assert np.abs(decoded.pixels.astype(int) - rgb).max() <= 1, name
+
+
+@pytest.mark.parametrize(
+    "name", ["a photo with spaces.jpg", "Brücke–№1 橋.jpg", "-rf.jpg", "100%{x}[red].jpg", "a'b\"c.jpg"]
+)
+def test_hostile_names(tmp_path: Path, name: str) -> None:
+    Image.fromarray(gradient()).save(tmp_path / name)
+    with store.temporary():
+        photo = ingest.bare(store.current().put(tmp_path / name), name, "wall", None, None, 5.0)
+    assert photo.name == name
+    assert photo.camera.width_px == 96
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from schemas.camera import CameraPose
+from schemas.camera import Camera, CameraPose
 from schemas.settings import PlanSettings
 from tasks.planning.airspace import Airspace
 from tasks.planning.coverage import BIAS_S, drawn, position_errors, reasons, seen_by
@@ -134,3 +134,21 @@ def test_strong_distortion_does_not_fold_far_points_into_the_photo() -> None:
     seen = seen_by(wide, fisheye, [from_the_south(0.0, 5.0)], 9.0, 79.0, Scene([wide], np.empty((0, 3))))
     reach = fisheye.undistort(np.array([[816 / 1200, 612 / 1200]]))[0] * 4.0
     assert np.abs(seen.uv_m[seen.photos > 0]).max(axis=0) == pytest.approx(reach, abs=0.5)
+
+
+def test_a_fisheye_shows_what_its_rays_meet_at_the_size_of_its_own_pixels() -> None:
+    fisheye = Camera(width_px=1632, height_px=1224, focal_px=800.0, lens="fisheye", k1=-0.02, k2=0.003)
+    wide = rectangle("wall-01", (0.0, 0.0, 5.0), (0, -1, 0), 16.0, 12.0)
+    pose = from_the_south(0.0, 5.0)
+    seen = seen_by(wide, fisheye, [pose], 100.0, 79.0, Scene([wide], np.empty((0, 3))))
+    points = wide.to_world(np.column_stack([seen.uv_m, np.zeros(len(seen.uv_m))]))
+    px = fisheye.project(points, pose)
+    inside = ((px >= -0.5) & (px <= np.array([1631.5, 1223.5]))).all(axis=1)
+    assert 0.3 < inside.mean() < 1.0
+    np.testing.assert_array_equal(seen.photos > 0, inside)
+    step = 1e-3  # m, along both axes of the wall: the inverse of the pixels' change is a pixel's size
+    along = [
+        (fisheye.project(points + step * np.asarray(axis), pose) - px) / step for axis in (wide.u, wide.v)
+    ]
+    sizes = 1000 / np.linalg.svd(np.stack(along, axis=2), compute_uv=False)[:, -1]
+    np.testing.assert_allclose(seen.best_mm_px[inside], sizes[inside], rtol=2e-3)

@@ -18,6 +18,9 @@ from tasks.stitching.tracks import Observations
 from tasks.stitching.view import FACING, View, rotation, rotation_vector, shrunk
 
 CAMERA = Camera(width_px=800, height_px=600, focal_px=1000.0, k1=-0.08, k2=0.02, p1=1e-3, p2=-5e-4, k3=0.01)
+FISHEYE = Camera(
+    width_px=800, height_px=600, focal_px=600.0, lens="fisheye", k1=-0.02, k2=0.004, k3=0.001, k4=-0.0005
+)
 angles = st.floats(-0.5, 0.5)
 
 
@@ -83,16 +86,17 @@ def test_skyline_refuses_what_is_not_positive() -> None:
         solve_positive(np.diag([1.0, -1.0]), np.ones(2))
 
 
-def test_derivatives_of_the_bundle() -> None:
+@pytest.mark.parametrize("camera", [CAMERA, FISHEYE], ids=["brown", "fisheye"])
+def test_derivatives_of_the_bundle(camera: Camera) -> None:
     rng = np.random.default_rng(0)
-    views = [view(0.1, 0.05, 0.0), view(-0.1, 0.1, 0.2)]
+    views = [view(0.1, 0.05, 0.0, camera), view(-0.1, 0.1, 0.2, camera)]
     photo = np.repeat([0, 1], 20)
     track = np.tile(np.arange(20), 2)
     order = np.argsort(track, kind="stable")
     xy = rng.uniform(50, 550, (40, 2))
     priors = [Prior(v, np.full(3, 0.1), np.full(3, 0.05)) for v in views]
     seen = Observations(photo[order], track[order], xy)
-    bundle = build_bundle(views, (CAMERA,), seen, priors, np.full(3, 0.1), [0.01, 0.01], np.full(2, 5.0))
+    bundle = build_bundle(views, (camera,), seen, priors, np.full(3, 0.1), [0.01, 0.01], np.full(2, 5.0))
     state = State(
         R=np.stack([v.R for v in views]),
         C=np.stack([v.C for v in views]),
