@@ -126,7 +126,7 @@ def blind_pairs() -> Iterator[Row]:
     """Nothing known: each overlapping pair for itself, before the fine step."""
     right: dict[str, list[bool]] = {"ours": [], **{name: [] for name in BLIND}}
     ours_on_some: list[bool] = []
-    for _, case in _surveys("pairs"):
+    for _, case in _surveys("pairs", COARSE_STEP_DEG):
         found, _, _ = registered(case)
         pairs = [(p.source, p.target) for p in found.pairs]
         placed = _placed_blindly(case.without_positions(), pairs)
@@ -140,8 +140,14 @@ def blind_pairs() -> Iterator[Row]:
                     right[name].append(_right(of_peer(scans_m[source], scans_m[target], 0.5), truth))
     seeds = f"{len(SEEDS)} seeds"
     what = "no poses: pairs right before the fine step"
-    yield row(what, _share(right["ours"]), "%", "≥ 95", **_bridge(f"{len(right['ours'])} pairs of {seeds}"))
-    known = _bridge(f"{len(ours_on_some)} pairs of {seeds}")
+    yield row(
+        what,
+        _share(right["ours"]),
+        "%",
+        "≥ 95",
+        **_bridge(f"{len(right['ours'])} pairs of {seeds}", COARSE_STEP_DEG),
+    )
+    known = _bridge(f"{len(ours_on_some)} pairs of {seeds}", COARSE_STEP_DEG)
     what = f"no poses: pairs right, of every {EVERY}th"
     for name in BLIND:
         peer = {"peer": name, "peer_value": _share(right[name])}
