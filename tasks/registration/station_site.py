@@ -67,6 +67,8 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
         prior = np.array(scan.T_world_scan) @ pose(np.eye(3), loaded.origin_m)
     elif loaded.T_world_scan is not None:
         prior = loaded.T_world_scan
+    elif loaded.origin_m.any():  # large coordinates are the world's
+        prior = pose(np.eye(3), loaded.origin_m)
     scanner_m = loaded.viewpoint_m
     position_m = None
     if scan.station_position_m is not None:
