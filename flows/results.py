@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from artifacts.evaluation_pictures import curves_picture
 from artifacts.mission_files import write_missions
 from artifacts.run_folder import lay_out
 from schemas.detection import Detection, Patterns
@@ -56,6 +55,8 @@ def write_evaluation(
     folder: Path, evaluations: Sequence[Evaluation], curves: Curves | None, left_out: Sequence[LeftOut]
 ) -> None:
     """evaluation.json; curves.png where there are curves."""
+    from artifacts.evaluation_pictures import curves_picture
+
     content = {
         "images": evaluations[0].images,
         "results": [one.model_dump(mode="json") for one in evaluations],
