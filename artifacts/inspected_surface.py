@@ -11,6 +11,7 @@ from artifacts import atlas, precision
 from artifacts.close_up import close_up
 from artifacts.data_uri import jpeg_uri
 from artifacts.mosaic_view import MosaicView, OpenFile, reduced_mask
+from artifacts.photo_pages import PhotoPages, photo_pages
 from artifacts.raster import read_mask
 from artifacts.surface_sheet import sheet
 from artifacts.width_graph import width_graph
@@ -67,6 +68,7 @@ class SurfacePages:
     sheet: Markup
     cards: tuple[Card, ...]
     panels: tuple[Panel, ...]
+    photos: PhotoPages | None  # of a mosaic; None of a photo that stands for itself
 
 
 def surface_pages(
@@ -101,7 +103,8 @@ def surface_pages(
             drawn = sheet(view, one.cracks, anchors, sheet_bytes, **size)
             wanted = inspection.report.baselines or inspection.detect.baselines
             panels = tuple(_panels(one, view, mask, open_file, panel_bytes)) if wanted else ()
-        yield SurfacePages(one, compact, drawn, tuple(cards), panels)
+            photos = photo_pages(view, open_file) if len(one.mosaic.photos) > 1 else None
+        yield SurfacePages(one, compact, drawn, tuple(cards), panels, photos)
 
 
 def matched(

@@ -76,7 +76,7 @@ def write_report(
         report=report,
         summary=Summary(inspection, report, seen, structure, plan, log),
         pages=pages,
-        stitched=[one for one in seen if len(one.mosaic.placements) > 1],
+        stitched=[page for page in pages if page.photos is not None],
         rows=_crack_rows(report.cracks, pages),
         map_pictures=_map(report, seen, structure),
         orbit=orbit_view(Scene(structure, plan, log, report.cracks, _inspected(seen)), cloud),

@@ -20,6 +20,14 @@ class PhotoPlacement(Contract):
     gain: float = 1.0
 
 
+class MatchEdge(Contract):
+    """Two photos whose features match by the pairwise test."""
+
+    photos: tuple[int, int]  # indices into the mosaic's photos
+    matches: int
+    held: bool  # False: it disagrees with the rest of the graph and does not count
+
+
 class Mosaic(Contract):
     """Mosaic pixel (x, y) lies at u = origin_uv_m[0] + x·gsd, v = origin_uv_m[1] − y·gsd of its surface
     (v is up, y down). Without a surface the frame is the mosaic's own plane. gsd_mm_px None: no scale is
@@ -37,6 +45,7 @@ class Mosaic(Contract):
     origin_uv_m: Vector2
     photos: tuple[Photo, ...]
     placements: tuple[PhotoPlacement, ...]  # one a photo, in the order of `photos`
+    edges: tuple[MatchEdge, ...] = ()
     covered_m2: float | None
     rms_px: float | None
     left_out: tuple[LeftOut, ...] = ()

@@ -1,10 +1,13 @@
 """A photo, checked and understood."""
 
+from collections.abc import Sequence
+from statistics import median
+
 from schemas.camera import Camera, CameraPose
-from schemas.contract import Contract, Vector3
+from schemas.contract import Contract, Vector3, Vector4
 from schemas.file import File
 
-BLURRED = 0.3  # of the median sharpness: scenes differ by a fifth, 4 px of blur by four to ten
+BLURRED = 0.25  # of the median along any direction: scenes differ by a fifth, 15 px of motion by five to ten
 LOST = 0.5  # share of a photo that is clipped: real photos of structures have at most a few hundredths
 
 
@@ -20,6 +23,7 @@ class Photo(Contract):
     view_deg: Vector3 | None = None  # yaw, pitch, roll of the camera from XMP, as in CameraPose
     surface: str  # the surface (or set) it belongs to
     sharpness: float  # variance of the Laplacian over that of local contrast, dimensionless; blur lowers it
+    sharpness_along: Vector4 | None = None  # at 0, 90, 45 and 135°: motion lowers one; None: alike
     exposure: float  # mean grey, 0..1
     white: float = 0.0  # share of pixels that are white through and through, and
     black: float = 0.0  # that are black: their brightness is lost
@@ -32,6 +36,14 @@ class Photo(Contract):
         if self.white > LOST:
             return f"overexposed ({self.white:.0%} of it is white)"
         return f"underexposed ({self.black:.0%} of it is black)" if self.black > LOST else None
+
+
+def sharpness_shares(photos: Sequence[Photo]) -> list[float]:
+    """Of each photo, its sharpness over the median photo's, along the direction where this is least; 1 where
+    nothing can be compared."""
+    along = [p.sharpness_along or (p.sharpness,) * 4 for p in photos]
+    usual = [median(one[k] for one in along) for k in range(4)] if along else []
+    return [min(a / u if u > 0 else 1.0 for a, u in zip(one, usual, strict=True)) for one in along]
 
 
 class Features(Contract):

@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from schemas.arrival import Arrival
 from schemas.flight_plan import FlightPlan
-from schemas.photo import BLURRED, Photo
+from schemas.photo import BLURRED, Photo, sharpness_shares
 
 LEAST_TO_COMPARE = 3  # photos, before one can be called less sharp than its neighbours
 FAR_SIGMAS = 4.0  # from every shooting point: the photo is of none of them
@@ -21,17 +21,17 @@ def judged(photos: Sequence[Photo], plan: FlightPlan | None) -> tuple[Arrival, .
     """One a photo, in their order of arrival. A photo of which a later one makes a fool is judged anew: all
     are compared with all that there are."""
     names: dict[str, str] = {}
-    median = float(np.median([p.sharpness for p in photos])) if len(photos) > LEAST_TO_COMPARE else 0.0
+    compared = len(photos) > LEAST_TO_COMPARE
     faults: list[list[str]] = []
-    for photo in photos:
+    for photo, share in zip(photos, sharpness_shares(photos), strict=True):
         of_photo = []
         twin = names.setdefault(photo.file.sha256, photo.name)
         if twin != photo.name:
             of_photo.append(f"the same picture as {twin}")
         if photo.misexposed:
             of_photo.append(photo.misexposed)
-        elif photo.sharpness < BLURRED * median:
-            of_photo.append(f"blurred (sharpness {photo.sharpness / median:.0%} of its neighbours')")
+        elif compared and share < BLURRED:
+            of_photo.append(f"blurred (sharpness {share:.0%} of its neighbours')")
         faults.append(of_photo)
     if plan is None:
         return tuple(Arrival(name=p.name, faults=tuple(f)) for p, f in zip(photos, faults, strict=True))

@@ -49,6 +49,7 @@ def ingest(
         camera = camera_of_photo(camera, width_px, height_px, decoded.orientation, name)
         camera_from, focal_sigma = "inspection", 0.01
     white, black = clipped(decoded.pixels)
+    sharp, along = sharpness(decoded.pixels)
     if not decoded.as_it_came:
         with store.current().scratch() as folder:
             Image.fromarray(decoded.pixels).save(folder / "upright.png", compress_level=3)
@@ -64,7 +65,8 @@ def ingest(
         gps=metadata.gps,
         view_deg=metadata.view_deg,
         surface=surface,
-        sharpness=sharpness(decoded.pixels),
+        sharpness=sharp,
+        sharpness_along=along,
         exposure=exposure(decoded.pixels),
         orientation=decoded.orientation,
         white=white,

@@ -135,4 +135,6 @@ def _reindexed(solved: Solved, good: Sequence[int]) -> Solved:
         matches={good[i]: count for i, count in solved.matches.items()},
         rms_px={good[i]: rms for i, rms in solved.rms_px.items()},
         covariance={good[i]: two for i, two in solved.covariance.items()},
+        edges=tuple(replace(edge, a=good[edge.a], b=good[edge.b]) for edge in solved.edges),
+        held=frozenset((good[a], good[b]) for a, b in solved.held),
     )

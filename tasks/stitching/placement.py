@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from schemas.photo import BLURRED, Photo
+from schemas.photo import BLURRED, Photo, sharpness_shares
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.prior import PlaneFrame, Prior
 from tasks.stitching.view import Array, View
@@ -33,17 +33,17 @@ class Fate:
 def unusable(photos: Sequence[Photo], min_sharpness: float | None) -> dict[int, str]:
     """Photos that are not even matched, and why: blurred, clipped, or the same file twice."""
     reasons: dict[int, str] = {}
-    median = float(np.median([p.sharpness for p in photos]))
-    least = BLURRED * median if min_sharpness is None else min_sharpness
+    shares = sharpness_shares(photos)
     first: dict[str, str] = {}
     for i, photo in enumerate(photos):
         twin = first.setdefault(photo.file.sha256, photo.name)
+        blurred = shares[i] < BLURRED if min_sharpness is None else photo.sharpness < min_sharpness
         if twin != photo.name:
             reasons[i] = f"the same picture as {twin}"
         elif photo.misexposed:
             reasons[i] = photo.misexposed
-        elif photo.sharpness < least and photo.exposure > 0.0:
-            share = f"sharpness {photo.sharpness:.3g}, its neighbours' median {median:.3g}"
+        elif blurred and photo.exposure > 0.0:
+            share = f"sharpness {photo.sharpness:.3g}, {shares[i]:.0%} of its neighbours' where it is least"
             reasons[i] = f"blurred ({share})"
     return reasons
 

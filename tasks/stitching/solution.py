@@ -8,7 +8,7 @@ import numpy as np
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.averaging import Guess, average
 from tasks.stitching.candidates import candidate_pairs
-from tasks.stitching.pairs import PhotoFeatures, match_pairs
+from tasks.stitching.pairs import Edge, PhotoFeatures, match_pairs
 from tasks.stitching.placement import elsewhere
 from tasks.stitching.prior import PlaneFrame
 from tasks.stitching.tracks import Observations, build_tracks
@@ -29,7 +29,8 @@ class Solved:
     covariance: dict[int, Array]  # (2, 2), plane units², of where each photo's middle lies among the others
     sigma_scale: float  # of the whole, relative
     sigma_px: float
-    false_edges: int
+    edges: tuple[Edge, ...]  # that passed the pairwise test, and
+    held: frozenset[tuple[int, int]]  # those among them that the whole graph agrees with
 
 
 def solve(
@@ -41,8 +42,8 @@ def solve(
     on_progress: Callable[[float], None],
 ) -> Solved:
     """Views of all photos that the matches hold together."""
-    edges = match_pairs(pairs, features, frame.priors, ransac_px, lambda f: on_progress(0.6 * f))
-    matched = len(edges)
+    matched = match_pairs(pairs, features, frame.priors, ransac_px, lambda f: on_progress(0.6 * f))
+    edges = matched
     for _ in range(ATTEMPTS):
         guess = average(edges, features, frame.priors)
         held = _anchored(guess, frame)
@@ -63,9 +64,9 @@ def solve(
             guess.component, set(map(int, np.unique(observations.photo))), adjusted.views, frame, features
         )
         if not loose:
-            return _solved(adjusted, matched - len(edges))
+            return _solved(adjusted, matched, edges)
         edges = [e for e in edges if e.a not in loose and e.b not in loose]
-    return Solved({}, {}, {}, {}, 0.0, 0.0, matched)
+    return Solved({}, {}, {}, {}, 0.0, 0.0, tuple(matched), frozenset())
 
 
 def neighbours(features: Sequence[PhotoFeatures], frame: PlaneFrame) -> list[tuple[int, int]]:
@@ -103,7 +104,7 @@ def _loose(observations: Observations, adjusted: Adjusted) -> set[int]:
     return {int(i) for i in np.flatnonzero((bad | behind | odd) & (before > 0))}
 
 
-def _solved(adjusted: Adjusted, false_edges: int) -> Solved:
+def _solved(adjusted: Adjusted, matched: Sequence[Edge], held: Sequence[Edge]) -> Solved:
     photo = adjusted.observations.photo
     count = np.bincount(photo, minlength=len(adjusted.views))
     squares = np.bincount(photo, (adjusted.residual_px**2).sum(axis=1), minlength=len(adjusted.views))
@@ -115,5 +116,6 @@ def _solved(adjusted: Adjusted, false_edges: int) -> Solved:
         covariance=dict(zip((int(i) for i in seen), adjusted.certainty.relative, strict=True)),
         sigma_scale=adjusted.certainty.scale,
         sigma_px=adjusted.sigma_px,
-        false_edges=false_edges,
+        edges=tuple(matched),
+        held=frozenset((edge.a, edge.b) for edge in held),
     )

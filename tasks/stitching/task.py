@@ -8,11 +8,13 @@ import cv2
 import numpy as np
 
 from artifacts import store
+from artifacts.match_graph import edge_picture
 from artifacts.mosaic import MosaicWriter
 from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of, thumbnail
+from artifacts.uncertainty_map import sigma_mm
 from schemas.contract import Matrix3, Vector2
-from schemas.mosaic import Mosaic, PhotoPlacement
+from schemas.mosaic import MatchEdge, Mosaic, PhotoPlacement
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput, LeftOut
 from schemas.settings import StitchSettings
@@ -34,7 +36,8 @@ REMEDY = {
 
 
 def pages(inputs: Mapping[str, Any], mosaic: Mosaic) -> list[Page]:
-    picture, _ = thumbnail(mosaic)
+    picture, scale = thumbnail(mosaic)
+    graph = edge_picture(mosaic, picture, scale)
     counts = ", ".join(
         f"{sum(p.status == status for p in mosaic.placements)} {status}"
         for status in ("solved", "placed", "rejected")
@@ -47,6 +50,7 @@ def pages(inputs: Mapping[str, Any], mosaic: Mosaic) -> list[Page]:
             "status": p.status,
             "reason": p.reason,
             "matches": p.matches,
+            "sigma_mm": None if (sigma := sigma_mm(p)) is None else round(sigma, 3),
             "rms_px": None if p.rms_px is None else round(p.rms_px, 3),
             "gain": round(p.gain, 3),
         }
@@ -54,6 +58,11 @@ def pages(inputs: Mapping[str, Any], mosaic: Mosaic) -> list[Page]:
     ]
     return [
         Page(key=page_key("mosaic", mosaic.name), markdown=f"{text}\n\n{markdown_of(picture, mosaic.name)}"),
+        Page(
+            key=page_key("match-graph", mosaic.name),
+            markdown=f"### Match graph of {mosaic.name}: {len(mosaic.edges)} pairs,"
+            f" {sum(not e.held for e in mosaic.edges)} of them false\n\n{markdown_of(graph, mosaic.name)}",
+        ),
         Page(key=page_key("photos", mosaic.name), table=rows),
     ]
 
@@ -91,6 +100,10 @@ def stitch(
         origin_uv_m=(canvas.left, canvas.top) if metric else (0.0, 0.0),
         photos=tuple(_as_adjusted(registered, i) for i in range(len(ordered))),
         placements=placements,
+        edges=tuple(
+            MatchEdge(photos=(e.a, e.b), matches=len(e.matches), held=(e.a, e.b) in solved.held)
+            for e in solved.edges
+        ),
         rms_px=float(np.sqrt(sum(squares) / sum(solved.matches.values()))) if squares else None,
         left_out=tuple(
             LeftOut(item=p.name, stage="stitching", what=p.reason, remedy=_remedy(p.reason))
