@@ -3,6 +3,7 @@
 import base64
 from collections.abc import Iterable
 from contextlib import closing
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -52,6 +53,12 @@ def lines_markdown(mosaic: Mosaic, lines: Iterable[tuple[Vector2, ...]], colour:
         points = np.rint((np.asarray(line) + 0.5) * scale - 0.5).astype(np.int32)
         cv2.polylines(picture, [points], isClosed=False, color=colour, thickness=2, lineType=cv2.LINE_AA)
     return markdown_of(picture, mosaic.name)
+
+
+def write_png(path: Path, rgb: npt.NDArray[np.uint8]) -> None:
+    """Of (H, W, 3) RGB."""
+    _, encoded = cv2.imencode(".png", rgb[..., ::-1])
+    path.write_bytes(encoded.tobytes())
 
 
 def markdown_of(rgb: npt.NDArray[np.uint8], alt: str) -> str:

@@ -70,7 +70,7 @@ def plan(inspection: Inspection, structure: Structure) -> FlightPlan:
         structure,
         inspection.camera.camera(),
         inspection.vehicle,
-        inspection.origin or REHEARSAL_ORIGIN,
+        inspection.origin or structure.geo_origin(inspection.utm_zone) or REHEARSAL_ORIGIN,
         inspection.home_m,
         inspection.plan,
     )

@@ -1,8 +1,8 @@
 """`hairline evaluate`: how well each method's cracks agree with masks that people drew."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
@@ -14,11 +14,17 @@ from flows.command_line import app
 from flows.console import out as console
 from flows.photo_commands import Method
 from flows.plain_files import OutFolder, photos_in, warn, working
-from schemas.evaluation import Evaluation
+from schemas.detection import Patterns
+from schemas.evaluation import Curves, Evaluation
+from schemas.mosaic import Mosaic
 from schemas.problem import BadInput, LeftOut
 from schemas.settings import DetectSettings
 
 Mask = npt.NDArray[np.bool_]
+Probability = npt.NDArray[np.uint8]
+
+TOLERANCE_PX = 2  # of the curves, and of what is worst
+WORST = 8  # images shown
 ALL = {
     "hairline": DetectSettings(method="hairline"),
     "ridge": DetectSettings(method="ridge"),
@@ -37,7 +43,9 @@ def evaluate(
     method: Annotated[tuple[Method, ...], Parameter(consume_multiple=True)] = (),
     gsd_mm_px: float | None = None,
 ) -> None:
-    """Compare found cracks with drawn masks: precision, recall, F1 at 0, 2 and 5 px, D/evaluation.json.
+    """Compare found cracks with drawn masks: precision, recall, F1 at 0, 2 and 5 px, D/evaluation.json;
+    D/curves.png with precision, recall and calibration of the network; D/worst/ with the worst images, what
+    was found right in green, falsely in red, and missed in blue.
 
     Parameters
     ----------
@@ -52,25 +60,35 @@ def evaluate(
     gsd_mm_px:
         Ground sample distance, mm per pixel, where it is known.
     """
-    from flows.results import write_json
+    from flows.results import write_evaluation
 
     if "onnx" in method:
         raise BadInput("--method onnx", "has no network to try", "Compare its masks: hairline detect --model")
     chosen: dict[str, DetectSettings] = {name: DetectSettings(method=name) for name in method}
     methods = chosen or ALL
     with working(out) as progress:
-        evaluations, left_out = compare(images, masks, methods, gsd_mm_px, progress)
-        write_json(
-            out / "evaluation.json",
-            {
-                "images": evaluations[0].images,
-                "results": [one.model_dump(mode="json") for one in evaluations],
-                "left_out": [one.model_dump(mode="json") for one in left_out],
-            },
-        )
-    console.print(as_table(evaluations))
-    console.print(f"{evaluations[0].images} images: {out / 'evaluation.json'}")
-    warn(left_out)
+        result = compare(images, masks, methods, gsd_mm_px, progress)
+        write_evaluation(out, result.evaluations, result.curves, result.left_out)
+        write_worst(out / "worst", result.worst)
+    console.print(as_table(result.evaluations))
+    console.print(f"{result.evaluations[0].images} images: {out / 'evaluation.json'}, {out / 'worst'}")
+    warn(result.left_out)
+
+
+class Judged(NamedTuple):
+    """An image as the first method did on it."""
+
+    path: Path
+    truth: Mask
+    found: Mask
+    f1: float
+
+
+class Comparison(NamedTuple):
+    evaluations: list[Evaluation]  # of each method and tolerance
+    curves: Curves | None  # where the network is one of the methods
+    worst: list[Judged]
+    left_out: list[LeftOut]  # images that could not be used
 
 
 def compare(
@@ -79,50 +97,63 @@ def compare(
     methods: dict[str, DetectSettings],
     gsd_mm_px: float | None,
     progress: Callable[[float], None],
-) -> tuple[list[Evaluation], list[LeftOut]]:
-    """An Evaluation for each method and tolerance, and the images that could not be used."""
+) -> Comparison:
+    """Every method on every image."""
+    from tasks.assessment.task import curves, f1_of
     from tasks.assessment.task import evaluate as evaluate_masks
+    from tasks.detection.task import crack_probability
 
     drawn = {path.stem: path for path in photos_in(masks)}
     found: dict[str, list[tuple[Mask, Mask]]] = {name: [] for name in methods}
+    judged: list[Judged] = []
+    probabilities: list[tuple[Probability, Mask]] = []
     problems = []
     paths = photos_in(images)
     for number, path in enumerate(paths, start=1):
         try:
             truth = read_mask(drawn, path)
-            for name, mask in masks_of(path, methods, gsd_mm_px):
-                if mask.shape != truth.shape:
-                    raise BadInput(
-                        path.name, "and its mask differ in size", "Give the mask of this very image"
-                    )
+            mosaic, patterns = prepared(path, gsd_mm_px, truth.shape)
+            of_methods = {name: mask_of(mosaic, patterns, settings) for name, settings in methods.items()}
+            if "hairline" in methods:
+                probabilities.append((crack_probability(mosaic, patterns), truth))
+            for name, mask in of_methods.items():
                 found[name].append((mask, truth))
+            first = next(iter(of_methods.values()))
+            judged.append(Judged(path, truth, first, f1_of(first, truth, TOLERANCE_PX)))
         except BadInput as problem:
             problems.append(problem)
         progress(number / len(paths))
-    if not any(found.values()):
+    if not judged:
         raise problems[0]
-    evaluations = [one for name, pairs in found.items() for one in evaluate_masks(name, pairs)]
-    return evaluations, [LeftOut.because("evaluation", problem) for problem in problems]
+    return Comparison(
+        [one for name, pairs in found.items() for one in evaluate_masks(name, pairs)],
+        curves(probabilities, TOLERANCE_PX) if probabilities else None,
+        sorted(judged, key=lambda one: one.f1)[:WORST],
+        [LeftOut.because("evaluation", problem) for problem in problems],
+    )
 
 
-def masks_of(
-    path: Path, methods: dict[str, DetectSettings], gsd_mm_px: float | None
-) -> Iterator[tuple[str, Mask]]:
-    """The mask that each method finds in an image."""
+def prepared(path: Path, gsd_mm_px: float | None, shape: tuple[int, ...]) -> tuple[Mosaic, Patterns]:
+    """One image as the stages take it."""
     from artifacts import store
     from schemas.settings import PatternSettings
-    from tasks.detection.task import detect
     from tasks.patterns.task import remove_patterns
     from tasks.photos.task import ingest
     from tasks.stitching.task import single
 
     photo = ingest.bare(store.current().put(path), path.name, path.stem, None, None, 5.0)
     mosaic = single.bare(photo, gsd_mm_px)
-    patterns = remove_patterns.bare(mosaic, PatternSettings())
-    for name, settings in methods.items():
-        detection = detect.bare(mosaic, patterns, settings)
-        mask = cv2.imread(str(store.current().path(detection.mask)), cv2.IMREAD_GRAYSCALE)
-        yield name, np.asarray(mask) > 0
+    if (mosaic.height_px, mosaic.width_px) != shape:
+        raise BadInput(path.name, "and its mask differ in size", "Give the mask of this very image")
+    return mosaic, remove_patterns.bare(mosaic, PatternSettings())
+
+
+def mask_of(mosaic: Mosaic, patterns: Patterns, settings: DetectSettings) -> Mask:
+    from artifacts import store
+    from tasks.detection.task import detect
+
+    path = store.current().path(detect.bare(mosaic, patterns, settings).mask)
+    return np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)) > 0
 
 
 def read_mask(drawn: dict[str, Path], image: Path) -> Mask:
@@ -148,3 +179,16 @@ def as_table(evaluations: list[Evaluation]) -> Table:
             *(f"{figure:.3f}" for figure in (one.mean.f1, one.length.recall, one.length.precision)),
         )
     return table
+
+
+def write_worst(folder: Path, worst: list[Judged]) -> None:
+    from artifacts.evaluation_pictures import side_by_side
+    from tasks.assessment.task import near
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, one in enumerate(worst, start=1):
+        rgb = np.asarray(cv2.imread(str(one.path), cv2.IMREAD_COLOR), dtype=np.uint8)[..., ::-1]
+        close = near(one.truth, TOLERANCE_PX), near(one.found, TOLERANCE_PX)
+        picture = side_by_side(rgb, one.truth, one.found, *close)
+        name = f"{number}-F1-{one.f1:.2f}-{one.path.stem}.jpg"
+        cv2.imwrite(str(folder / name), np.ascontiguousarray(picture[..., ::-1]))

@@ -108,4 +108,5 @@ def _flight_lines(folder: Path, scans: list[Path], logs: list[Path]) -> list[str
         "#   or the file of `hairline calibrate`, as in camera: camera.yaml",
         "#   {width_px: 8192, height_px: 5460, focal_mm: 35, sensor_width_mm: 35.9}",
         "# origin: {latitude_deg: 47.0, longitude_deg: 8.0, altitude_m: 400}  # WGS84 of (0, 0, 0)",
+        "# utm_zone: 32N  # instead of origin, for scans in UTM whose files do not state it",
     ]

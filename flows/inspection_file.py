@@ -1,6 +1,7 @@
 """Reading the inspection file, with messages that name the key and say what to do."""
 
 from pathlib import Path
+from typing import Any
 
 import yaml
 from pydantic import ValidationError
@@ -11,6 +12,17 @@ from schemas.problem import BadInput
 
 def read_inspection(path: Path) -> Inspection:
     """The inspection that a YAML file describes. BadInput names the line or key that is wrong."""
+    content = settings_in(path)
+    if isinstance(content.get("camera"), str):
+        content["camera"] = read_camera_file(existing(path.parent, content["camera"], "camera")).model_dump()
+    try:
+        return Inspection.model_validate(content)
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
+
+
+def settings_in(path: Path) -> dict[str, Any]:
+    """What stands in a YAML file; BadInput where that is no settings."""
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -27,12 +39,7 @@ def read_inspection(path: Path) -> Inspection:
         ) from None
     if not isinstance(content, dict):
         raise BadInput(str(path), "holds no settings", "Write one with: hairline init FOLDER")
-    if isinstance(content.get("camera"), str):
-        content["camera"] = read_camera_file(existing(path.parent, content["camera"], "camera")).model_dump()
-    try:
-        return Inspection.model_validate(content)
-    except ValidationError as problem:
-        raise explain(str(path), problem) from None
+    return content
 
 
 def read_camera_file(path: Path) -> CameraInput:

@@ -69,9 +69,12 @@ def _ingest_call(given: ScanInput, base: Path) -> tuple[object, ...]:
     path = existing(base, given.file, "scans")
     if not path.is_file():
         raise BadInput(given.file, "is not a file", "Name one scan file per entry of 'scans'")
-    seen = tuple(SeenTarget(name=name, position=place) for name, place in given.targets.items())
-    file = store.current().put(path)
+    file, seen = store.current().put(path), seen_targets(given)
     return (file, path.name, METRES[given.unit], given.position_m, given.T_world_scan, seen)
+
+
+def seen_targets(given: ScanInput) -> tuple[SeenTarget, ...]:
+    return tuple(SeenTarget(name=name, position=place) for name, place in given.targets.items())
 
 
 @flow(name="model-structure", description=__doc__, persist_result=False, task_runner=one_a_core())

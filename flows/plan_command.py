@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import yaml
 from cyclopts import Parameter
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from rich.table import Table
 
 from flows.command_line import app
@@ -16,6 +16,7 @@ from flows.plain_files import Many, read_camera, read_contract, say, warn, worki
 from flows.structure_commands import enter_beside
 from schemas.problem import BadInput
 from schemas.settings import PlanSettings
+from schemas.utm import UtmZone
 from schemas.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def plan(
     radius_m: float | None = None,
     home_m: tuple[float, float, float] | None = None,
     origin: tuple[float, float, float] | None = None,
+    utm_zone: str | None = None,
     free: list[Six] | None = None,
     close_ups: Path | None = None,
     what_if: Annotated[bool, Parameter(negative=())] = False,
@@ -72,6 +74,8 @@ def plan(
         Take-off and landing place, east north up, metres. Default: a free place beside the structure.
     origin:
         Latitude, longitude (degrees) and altitude (metres) of the world's origin (WGS84).
+    utm_zone:
+        Instead of the origin, for scans in UTM: 32N, 56S… Not needed where LAS, LAZ or E57 files state it.
     free:
         A box that you vouch for as free of obstacles though no scanner saw it: its low and high corner, east
         north up, metres. May be given several times.
@@ -104,7 +108,7 @@ def plan(
         return
     if surfaces is None or structure is None or out is None:
         raise BadInput("plan", "needs surfaces.json and --out", "Give both, or --what-if for a table alone")
-    _plan(surfaces, structure, out, lens, vehicle, settings, home_m, origin, close_ups)
+    _plan(surfaces, structure, out, lens, vehicle, settings, home_m, origin, utm_zone, close_ups)
 
 
 def _plan(
@@ -116,6 +120,7 @@ def _plan(
     settings: PlanSettings,
     home_m: tuple[float, float, float] | None,
     origin: tuple[float, float, float] | None,
+    utm_zone: str | None,
     close_ups: Path | None,
 ) -> None:
     from flows.collect_images import REHEARSAL_ORIGIN
@@ -128,7 +133,7 @@ def _plan(
     where = (
         GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
         if origin
-        else REHEARSAL_ORIGIN
+        else structure.geo_origin(utm_zone and TypeAdapter(UtmZone).validate_python(utm_zone))
     )
     about = effort(structure, camera, vehicle, settings, cracks)
     gsd = settings.asked_gsd_mm_px
@@ -139,15 +144,18 @@ def _plan(
     )
     with working(out):
         enter_beside(surfaces, "occupied.ply", structure.occupied.sha256)
-        planned = plan_flight.bare(structure, camera, vehicle, where, home_m, settings, cracks)
+        planned = plan_flight.bare(
+            structure, camera, vehicle, where or REHEARSAL_ORIGIN, home_m, settings, cracks
+        )
         write_flight_plan(out, planned, copy=True)
     photos, minutes = len(planned.shooting_points), planned.duration_s / 60
     many = f" in {len(planned.flights)} flights" if len(planned.flights) > 1 else ""
     say(f"{photos} photos, {planned.length_m:.0f} m, {minutes:.1f} min{many}: {out / 'plan.json'}")
     warn(planned.left_out)
-    if origin is None:
+    if where is None:
         err.print(
-            "[yellow]Warning: no --origin: the mission lies at ArduPilot's simulator, not at yours[/yellow]"
+            "[yellow]Warning: neither --origin nor --utm-zone: the mission lies at ArduPilot's simulator,"
+            " not at yours[/yellow]"
         )
 
 

@@ -4,7 +4,7 @@ Pictures and clouds are links into the store unless `copy` is asked for; JSON an
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,12 @@ from pydantic import BaseModel
 from artifacts.mission_files import write_missions
 from artifacts.run_folder import lay_out
 from schemas.detection import Detection, Patterns
+from schemas.evaluation import Curves, Evaluation
 from schemas.file import Folder
 from schemas.flight_log import FlightLog
 from schemas.flight_plan import FlightPlan
 from schemas.mosaic import Mosaic
+from schemas.problem import LeftOut
 from schemas.registered_model import RegisteredModel
 from schemas.structure import Structure
 
@@ -47,6 +49,23 @@ def _shifted(T_world_scan: Any, origin_m: tuple[float, float, float]) -> Any:
     T = np.array(T_world_scan)
     T[:3, 3] += origin_m
     return T
+
+
+def write_evaluation(
+    folder: Path, evaluations: Sequence[Evaluation], curves: Curves | None, left_out: Sequence[LeftOut]
+) -> None:
+    """evaluation.json; curves.png where there are curves."""
+    from artifacts.evaluation_pictures import curves_picture
+
+    content = {
+        "images": evaluations[0].images,
+        "results": [one.model_dump(mode="json") for one in evaluations],
+        "curves": None if curves is None else curves.model_dump(mode="json"),
+        "left_out": [one.model_dump(mode="json") for one in left_out],
+    }
+    write_json(folder / "evaluation.json", content)
+    if curves is not None:
+        (folder / "curves.png").write_bytes(curves_picture(curves, evaluations))
 
 
 def write_structure(folder: Path, structure: Structure, copy: bool = False) -> None:

@@ -14,6 +14,7 @@ from flows.plain_files import (
 from schemas.problem import BadInput
 
 if TYPE_CHECKING:
+    from schemas.inspection import ScanInput
     from schemas.registered_model import RegisteredModel
     from schemas.scan import Scan
 
@@ -26,10 +27,12 @@ def register(
     voxel_m: float = 0.02,
     tau_m: float = 0.10,
     require_all: bool = False,
+    survey: Path | None = None,
 ) -> None:
-    """Register laser scans into one model: D/poses.json, D/model.ply.
+    """Register laser scans into one model: D/poses.json, D/model.ply, D/model.png.
 
-    poses.json holds per scan T_world_scan (4×4, metres) and its covariance, per pair overlap and RMSE.
+    poses.json holds per scan T_world_scan (4×4, metres) and its covariance, per pair overlap and RMSE, per
+    target how far the model misses it.
 
     Parameters
     ----------
@@ -45,31 +48,43 @@ def register(
         The paper's τ: points closer than this overlap, metres.
     require_all:
         Stop where a scan ties to no other. Default: it is named and the others go on.
+    survey:
+        What the crew knows, as YAML with an inspection file's keys: `targets` (name, position_m, check) for
+        surveyed ones, and `scans` (file, and its targets, position_m, T_world_scan, unit where known).
     """
-    from flows.model_structure import METRES
+    from artifacts.picture import write_png
     from flows.results import write_registration
+    from flows.survey_file import Survey, read_survey
     from schemas.scan import Scan
     from schemas.settings import RegistrationSettings
+    from tasks.registration.task import picture
     from tasks.registration.task import register as register_scans
 
     with working(out):
-        usable, left_out = one_by_one(list(scans), lambda path: ingested_scan(path, METRES[unit]))
+        known = read_survey(survey, list(scans)) if survey else Survey()
+        usable, left_out = one_by_one(list(scans), lambda path: ingested_scan(path, known.of(path, unit)))
         settings = RegistrationSettings(voxel_m=voxel_m, tau_m=tau_m, require_all=require_all)
         read: tuple[Scan, ...] = tuple(usable)
-        model = register_scans.bare(read, settings)
+        model = register_scans.bare(read, settings, known.targets)
         write_registration(out, model, copy=True)
+        write_png(out / "model.png", picture(model))
     taken_in = f"files that state no unit taken in {unit}"
     say(f"{len(model.stations)} scans registered, {taken_in}, {model.points:,} points: {out / 'model.ply'}")
+    for kind, rmse_m in (("control targets", model.control_rmse_m), ("check points", model.check_rmse_m)):
+        if rmse_m is not None:
+            say(f"{kind}: {1000 * rmse_m:.1f} mm RMSE")
     warn([*left_out, *model.left_out])
 
 
-def ingested_scan(path: Path, unit_m: float) -> "tuple[Scan, ...]":
+def ingested_scan(path: Path, known: "ScanInput") -> "tuple[Scan, ...]":
     from artifacts import store
+    from flows.model_structure import METRES, seen_targets
     from tasks.registration.task import ingest_scan
 
     if not path.is_file():
         raise BadInput(str(path), "no such file", "Correct the path")
-    return ingest_scan.bare(store.current().put(path), path.name, unit_m, None, None)
+    file, seen = store.current().put(path), seen_targets(known)
+    return ingest_scan.bare(file, path.name, METRES[known.unit], known.position_m, known.T_world_scan, seen)
 
 
 @app.command
@@ -82,7 +97,7 @@ def surfaces(
     distance_m: float = 0.02,
     epsilon_m: float = 0.5,
 ) -> None:
-    """Find flat surfaces and obstacles in a cloud: D/surfaces.json, D/occupied.ply.
+    """Find flat surfaces and obstacles in a cloud: D/surfaces.json, D/occupied.ply, D/surfaces.png.
 
     Parameters
     ----------
@@ -100,19 +115,21 @@ def surfaces(
     epsilon_m:
         The paper's ε: obstacles are more than this apart, metres.
     """
-    from flows.model_structure import METRES
+    from artifacts.picture import write_png
     from flows.results import write_structure
+    from schemas.inspection import ScanInput
     from schemas.settings import RegistrationSettings, SurfaceSettings
     from tasks.registration.task import register as register_scans
-    from tasks.surfaces.task import extract
+    from tasks.surfaces.task import extract, picture
 
     with working(out):
         model = registered_beside(cloud) or register_scans.bare(
-            ingested_scan(cloud, METRES[unit]), RegistrationSettings()
+            ingested_scan(cloud, ScanInput(file=cloud.name, unit=unit)), RegistrationSettings()
         )
         settings = SurfaceSettings(min_area_m2=min_area_m2, distance_m=distance_m, epsilon_m=epsilon_m)
         structure = extract.bare(model, settings)
         write_structure(out, structure, copy=True)
+        write_png(out / "surfaces.png", picture(structure))
     say(f"{len(structure.surfaces)} surfaces, {len(structure.obstacles)} obstacles: {out / 'surfaces.json'}")
     warn(structure.left_out)
 

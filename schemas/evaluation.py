@@ -20,3 +20,14 @@ class Evaluation(Contract):
     length: Scores  # of centrelines: the share of found length that is right, of true length that is found
     f1_interval: Vector2  # 95 % of the aggregate F1 when images are drawn anew (bootstrap)
     false_length_per_mpx: float  # pixels of found centreline that are not right, per megapixel of image
+
+
+class Curves(Contract):
+    """A network's probabilities against drawn masks, over all pixels."""
+
+    tolerance_px: int
+    threshold: tuple[float, ...]  # (255,) probability from which a pixel is called crack
+    precision: tuple[float, ...]  # (255,)
+    recall: tuple[float, ...]  # (255,)
+    said: tuple[float, ...]  # (≤ 10,) mean probability of the pixels of each tenth
+    was: tuple[float, ...]  # share of them that is crack

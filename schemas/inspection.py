@@ -19,6 +19,7 @@ from schemas.settings import (
     SurfaceSettings,
 )
 from schemas.target import SiteTarget
+from schemas.utm import UtmZone
 from schemas.vehicle import Vehicle
 
 
@@ -100,6 +101,7 @@ class Inspection(Contract):
     camera: CameraInput | None = None
     vehicle: Vehicle = Vehicle()
     origin: GeoOrigin | None = None
+    utm_zone: UtmZone | None = None  # of scans or targets in UTM, where no file states it; instead of origin
     home_m: Vector3 | None = None  # None: a free place beside the structure
     registration: RegistrationSettings = RegistrationSettings()
     surfaces: SurfaceSettings = SurfaceSettings()

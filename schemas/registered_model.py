@@ -6,6 +6,7 @@ from schemas.contract import Contract, Matrix4, Matrix6, Vector3
 from schemas.file import File
 from schemas.problem import LeftOut
 from schemas.target import TargetResidual
+from schemas.utm import UtmZone
 
 
 class Station(Contract):
@@ -49,6 +50,7 @@ class ScanPair(Contract):
 class RegisteredModel(Contract):
     cloud: File  # PLY, float32 metres: x y z nx ny nz and station (uchar/ushort index into stations)
     origin_m: Vector3 = (0.0, 0.0, 0.0)  # subtracted from large coordinates (UTM) to keep float32 exact
+    utm_zone: UtmZone | None = None  # of the world, where the scans' files state it
     stations: tuple[Station, ...]
     pairs: tuple[ScanPair, ...] = ()
     targets: tuple[TargetResidual, ...] = ()

@@ -3,6 +3,7 @@
 from schemas.contract import Contract, Matrix4, Vector3
 from schemas.file import File
 from schemas.target import SeenTarget
+from schemas.utm import UtmZone
 
 
 class Scan(Contract):
@@ -15,4 +16,5 @@ class Scan(Contract):
     unit_m: float = 1.0  # metres per unit of the file's coordinates
     station_position_m: Vector3 | None = None  # scanner position in the world, as measured by the crew
     T_world_scan: Matrix4 | None = None  # full prior pose, where the file or the crew has one
+    utm_zone: UtmZone | None = None  # of the file's coordinates, where the file states one
     targets: tuple[SeenTarget, ...] = ()

@@ -1,8 +1,8 @@
 """Make probabilities mean what they say: `python -m training.calibrate MODEL.onnx PHOTOS FOLD SURFACES...`.
 
 On photos of a fold that training left out, and on surfaces it never saw, this fits
-- slope and offset of the logits, so that of the pixels called 70 % seven in ten are crack (Platt 1999), for
-  training.export;
+- slope and offset of the logits, so that of the photos' pixels called 70 % seven in ten are crack (Platt
+  1999), for training.export; with the network so calibrated this is run once more;
 - the weights of a candidate's score (tasks.detection.candidates): its strength, length and bend against
   whether most of it lies on a crack that somebody drew;
 and counts false cracks on the surfaces without any, for each least score. Nothing else is fitted on anything.
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from schemas.raster import ArrayRaster
 from tasks.detection.candidates import EDGE, STRONGEST, SURE, features
 from tasks.detection.components import ELONGATION, components
-from tasks.detection.network import Model, Probability, probability
+from tasks.detection.network import OCTAVES, Model, Probability, probability
 from training.photos import by_fold
 
 NEAR_PX = 3
@@ -87,10 +87,10 @@ def judged(p: Probability, truth: Mask, least_px: float) -> tuple[Floats, Mask]:
 
 
 def main(model_path: Path, photos: Path, fold: int, folders: list[Path]) -> None:
-    model = Model(model_path.read_bytes(), model_path.name)
+    model = Model(model_path.read_bytes(), model_path.name, OCTAVES)
     of_photos = list(held_out(model, photos, fold))
     of_surfaces = [pair for folder in folders for pair in unseen(model, folder)]
-    slope, offset = fit_pixels(of_photos + of_surfaces)
+    slope, offset = fit_pixels(of_photos)
     print(f"logits: slope {slope:.3f}, offset {offset:+.3f} (1 and 0 where they are calibrated already)")
     seen, truths = zip(*(judged(p, truth, LEAST_PX) for p, truth in of_photos + of_surfaces), strict=True)
     x, y = np.vstack(seen), np.concatenate(truths)

@@ -29,6 +29,7 @@ STEP_PX = 1.0  # between the points of a crack
 SUPERSAMPLED = 8  # of the truth, along each axis
 VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
 CRACK_FREE = 0.35  # share of surfaces without any crack
+SMOOTH = 0.5  # share of cracks without roughness
 TEXEL_PX = 2.0
 
 Array = npt.NDArray[np.float64]
@@ -97,12 +98,11 @@ def _crack(
     rng: Rng, start: Array, heading: float, side_m: float, px_m: float, trunk: CrackShape | None = None
 ) -> CrackShape:
     n = int(rng.uniform(80, 700) if trunk is None else rng.uniform(40, 250))
+    smooth = rng.random() < SMOOTH  # seen from near, a crack bends slowly: no roughness at the pixels' scale
     turn = np.radians(rng.uniform(5, 40))
-    path = (
-        heading
-        + turn * _walk(rng, n, rng.uniform(15, 80))
-        + np.radians(rng.uniform(6, 35)) * _walk(rng, n, 3.0)
-    )
+    jitter = np.radians(rng.uniform(0, 6) if smooth else rng.uniform(6, 35))
+    bends_px = float(np.exp(rng.uniform(np.log(15), np.log(200))))
+    path = heading + turn * _walk(rng, n, bends_px) + jitter * _walk(rng, n, 3.0)
     uv = start + STEP_PX * px_m * np.cumsum(np.column_stack([np.cos(path), np.sin(path)]), axis=0)
     inside = np.flatnonzero(((uv < 0) | (uv > side_m)).any(axis=1))
     n = int(inside[0]) if len(inside) else n
@@ -112,7 +112,7 @@ def _crack(
         if rng.random() < 0.35
         else (float(rng.uniform(0.8, 4.5)))
     )
-    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.62))))
+    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.8))))
     if trunk is not None:
         width_px = float(np.median(trunk.left_m + trunk.right_m)) / px_m * rng.uniform(0.35, 0.9)
         kept = float(trunk.kept_light.mean())
@@ -124,9 +124,9 @@ def _crack(
     for _ in range(rng.poisson(0.8)):  # healed or filled for a stretch
         at, reach = rng.uniform(0, n), rng.uniform(3, 25)
         width *= 1.0 - rng.uniform(0.4, 1.0) * np.exp(-(((np.arange(n) - at) / reach) ** 2))
-    rough = rng.uniform(0.02, 0.15)
+    rough = rng.uniform(0.0, 0.03) if smooth else rng.uniform(0.02, 0.15)
     left, right = (np.maximum(width * (0.5 + rough * _walk(rng, n, 1.5)), 0.0) for _ in range(2))
-    light = np.clip(kept + 0.06 * _walk(rng, n, 40.0), 0.05, 0.75)
+    light = np.clip(kept + 0.06 * _walk(rng, n, 40.0), 0.05, 0.85)
     return CrackShape("c", None, uv[:n], left, right, light)
 
 
@@ -261,12 +261,15 @@ def _pores(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
 def _things(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
     """What lies on top: cables, chalk, markers, scratches."""
     shapes: list[Shapes] = []
-    for _ in range(rng.poisson(0.35)):  # a cable or wire, its shadow beside it
+    for _ in range(rng.poisson(0.35)):  # a cable or wire: round, so it shines along one side; its shadow
         start, end = _through(rng, side_m, rng.uniform(0, np.pi))
-        bow, wide = rng.normal(0, 0.04) * side_m, rng.uniform(1.0, 9.0) * px_m
+        bow, wide = rng.normal(0, 0.04) * side_m, rng.uniform(1.5, 9.0) * px_m
+        across = np.array([-(end - start)[1], (end - start)[0]]) / np.linalg.norm(end - start) * wide
         shapes.append(_straight(start, end, wide, float(rng.uniform(0.08, 0.5)), bow))
+        shine = rng.uniform(-0.35, 0.35) * across
+        shapes.append(_straight(start + shine, end + shine, 0.3 * wide, float(rng.uniform(1.2, 4.0)), bow))
         if rng.random() < 0.4:
-            off = rng.uniform(1.2, 4.0) * wide * np.array([1.0, -1.0])
+            off = rng.uniform(1.2, 4.0) * across
             shapes.append(_straight(start + off, end + off, wide, float(rng.uniform(0.5, 0.8)), bow))
     for _ in range(rng.poisson(0.5)):  # chalk and scratches: bright, and wandering like a crack
         mark = _crack(rng, rng.uniform(0, side_m, 2), rng.uniform(0, 2 * np.pi), side_m, px_m)

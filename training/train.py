@@ -91,9 +91,9 @@ def main() -> None:
     folds = by_fold(args.photos / "groups.txt")
     left_out = [] if args.fold is None else folds[args.fold]
     kept = [name for fold in folds for name in fold if name not in left_out]
-    photos = read(args.photos, kept, (0.5, 2.0))
+    photos = read(args.photos, kept, (0.5, 3.0))
     held = read(args.photos, left_out, (1.0, 1.0))
-    surfaces = read(args.surfaces, sorted(p.name for p in (args.surfaces / "masks").iterdir()), (0.7, 1.5))
+    surfaces = read(args.surfaces, sorted(p.name for p in (args.surfaces / "masks").iterdir()), (0.7, 2.0))
 
     net = Network().to(memory_format=torch.channels_last)
     if args.start is not None:
@@ -109,13 +109,11 @@ def main() -> None:
             rate = args.rate * min(step / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / args.steps))
             for group in optimiser.param_groups:
                 group["lr"] = rate
-            with torch.autocast("cpu", torch.bfloat16):
-                logit = net(rgb.contiguous(memory_format=torch.channels_last))
-            loss = loss_of(logit.float(), truth)
+            loss = loss_of(net(rgb.contiguous(memory_format=torch.channels_last)), truth)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
-            total += float(loss)
+            total += float(loss.detach())
             keep = min(AVERAGED, (1 + step) / (10 + step))
             with torch.no_grad():
                 for mine, new in zip(averaged.state_dict().values(), net.state_dict().values(), strict=True):

@@ -33,7 +33,7 @@ class Counts(NamedTuple):
 
 def count(found: Mask, truth: Mask, tolerance_px: int) -> Counts:
     """Both masks (H, W) bool."""
-    near_truth, near_found = _dilated(truth, tolerance_px), _dilated(found, tolerance_px)
+    near_truth, near_found = near(truth, tolerance_px), near(found, tolerance_px)
     return Counts(
         int((found & near_truth).sum()), int(found.sum()), int((truth & near_found).sum()), int(truth.sum())
     )
@@ -105,9 +105,13 @@ def _interval(counts: list[Counts]) -> tuple[float, float]:
     return round(float(low), 4), round(float(high), 4)
 
 
-def _dilated(mask: Mask, radius_px: int) -> Mask:
+def near(mask: Mask, radius_px: int) -> Mask:
+    """Pixels that lie within `radius_px` (Euclidean) of the mask."""
     if radius_px == 0:
         return mask
+    return np.asarray(cv2.dilate(mask.astype(np.uint8), disc(radius_px)) > 0)
+
+
+def disc(radius_px: int) -> npt.NDArray[np.uint8]:
     reach = np.arange(-radius_px, radius_px + 1)
-    disc = (reach[:, None] ** 2 + reach**2 <= radius_px**2).astype(np.uint8)
-    return np.asarray(cv2.dilate(mask.astype(np.uint8), disc) > 0)
+    return (reach[:, None] ** 2 + reach**2 <= radius_px**2).astype(np.uint8)

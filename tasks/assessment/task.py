@@ -9,7 +9,7 @@ from artifacts.page import Page
 from schemas.crack import Measurement
 from schemas.crack_report import CrackReport
 from schemas.detection import Detection, Patterns
-from schemas.evaluation import Evaluation
+from schemas.evaluation import Curves, Evaluation
 from schemas.file import Folder
 from schemas.flight_log import FlightLog
 from schemas.flight_plan import FlightPlan
@@ -23,6 +23,7 @@ from schemas.surface import Surface
 from tasks.stage import stage
 
 if TYPE_CHECKING:
+    from tasks.assessment.curves import Probability
     from tasks.assessment.evaluation import Mask
 
 
@@ -64,6 +65,27 @@ def evaluate(method: str, pairs: Iterable[tuple["Mask", "Mask"]]) -> tuple[Evalu
     from tasks.assessment.evaluation import evaluate as evaluate_masks
 
     return evaluate_masks(method, pairs)
+
+
+def curves(images: Iterable[tuple["Probability", "Mask"]], tolerance_px: int) -> Curves:
+    """Precision, recall and calibration of (probability, drawn mask), each (H, W)."""
+    from tasks.assessment.curves import curves as curves_of
+
+    return curves_of(images, tolerance_px)
+
+
+def f1_of(found: "Mask", truth: "Mask", tolerance_px: int) -> float:
+    """Of one image."""
+    from tasks.assessment.evaluation import count, scores
+
+    return scores(count(found, truth, tolerance_px)).f1
+
+
+def near(mask: "Mask", radius_px: int) -> "Mask":
+    """(H, W) pixels within `radius_px` of the mask."""
+    from tasks.assessment.evaluation import near as near_mask
+
+    return near_mask(mask, radius_px)
 
 
 def link(inputs: Mapping[str, Any], _folder: Folder) -> list[Page]:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from tasks.detection.sauvola import Field, Grey, Mask, moments_of_valid, window_sum
+from tasks.detection.sauvola import Counts, Field, Grey, Mask, moments_of_valid, window_sum
 
 WEAK, SEED = 1, 2
 WEAK_TEXTURES, SEED_TEXTURES = 3.0, 5.0  # this many textures darker, where the surface is smooth
@@ -52,21 +52,20 @@ def dark_levels(grey: Grey, valid: Mask, scale: Scale, k: float, R: float) -> np
     box = np.ones((scale.widest, scale.widest), np.uint8)
     closed256 = np.asarray(cv2.morphologyEx(smooth256, cv2.MORPH_CLOSE, box), dtype=np.float32)
     squares = window_sum(_brighter_half(smooth256, local.mean, valid), scale.window)
-    count = np.maximum(window_sum(valid.astype(np.float64), scale.window), 1.0)
-    texture = np.sqrt(2.0 * squares / count) / SIXTEENTHS
-    return np.asarray(_levels(smooth256, closed256, *local, texture, valid, k, R), dtype=np.uint8)
+    levels: npt.NDArray[np.uint8] = _levels(smooth256, closed256, *local, squares, valid, k, R)
+    return levels
 
 
 @njit(cache=True, nogil=True)
-def _brighter_half(smooth256: Levels256, mean: Field, valid: Mask) -> Field:
+def _brighter_half(smooth256: Levels256, mean: Field, valid: Mask) -> npt.NDArray[np.int32]:
     """Squared excess over the mean of what is brighter than it, in whole 1/16 grey levels."""
-    squared = np.zeros(mean.shape)
+    squared = np.zeros(mean.shape, np.int32)
     for y in range(mean.shape[0]):
         for x in range(mean.shape[1]):
             if valid[y, x]:
                 excess = smooth256[y, x] / 256.0 - mean[y, x]
                 if excess > 0.0:
-                    squared[y, x] = np.rint(excess * SIXTEENTHS) ** 2
+                    squared[y, x] = np.int32(np.rint(excess * SIXTEENTHS)) ** 2
     return squared
 
 
@@ -76,7 +75,8 @@ def _levels(
     closed256: Levels256,
     mean: Field,
     deviation: Field,
-    texture: Field,
+    count: Counts,
+    squares: Counts,
     valid: Mask,
     k: float,
     R: float,
@@ -88,7 +88,8 @@ def _levels(
             if not valid[y, x]:
                 continue
             depth = min(mean[y, x], closed256[y, x] / 256.0) - smooth256[y, x] / 256.0
-            rough = max(texture[y, x], NOISE_FLOOR)
+            texture = np.sqrt(2.0 * squares[y, x] / count[y, x]) / SIXTEENTHS
+            rough = max(texture, NOISE_FLOOR)
             share = rough / max(mean[y, x], 1.0)
             unit = mean[y, x] * (1.0 - deviation[y, x] / R)  # Sauvola's T is mean − k · unit
             if depth <= min(max(WEAK_TEXTURES * share, FAINTEST_WEAK), most_weak) * unit:

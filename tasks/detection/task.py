@@ -5,6 +5,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from artifacts import store
 from artifacts.page import Page, page_key
@@ -68,6 +69,16 @@ def _reason(length_px: float, mosaic: Mosaic) -> str:
     if mosaic.gsd_mm_px is None:
         return f"a joint: straight over {length_px:.0f} px"
     return f"a joint: straight over {length_px * mosaic.gsd_mm_px / 1000:.2f} m"
+
+
+def crack_probability(mosaic: Mosaic, patterns: Patterns) -> npt.NDArray[np.uint8]:
+    """(H, W) 255 × our network's probability; no stage: only the command line asks for it."""
+    from tasks.detection.network import our_model, probability
+
+    files = store.current()
+    paths = files.path(mosaic.image), files.path(mosaic.coverage)
+    with MosaicRaster(*paths, mosaic.name, files.path(patterns.mask)) as raster:
+        return probability(raster, our_model())
 
 
 def given_mask(mosaic: Mosaic, mask: File, name: str) -> Detection:

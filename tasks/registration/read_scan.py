@@ -60,6 +60,14 @@ def stated_unit_m(path: Path, name: str | None = None) -> float | None:
         return las.stated_unit_m(path)
 
 
+def stated_utm_zone(path: Path, name: str | None = None) -> str | None:
+    """Such as 32N, where the file itself says so (coordinate system of LAS, LAZ and E57)."""
+    with _BadInputOf(name or path.name):
+        if path.suffix.lower() in (".las", ".laz"):
+            return las.stated_utm_zone(path)
+        return e57.stated_utm_zone(path) if path.suffix.lower() == ".e57" else None
+
+
 def scan_blocks(
     path: Path, index: int = 0, unit_m: float = 1.0, name: str | None = None
 ) -> Iterator[LoadedScan]:

@@ -16,8 +16,12 @@ from tasks.registration.voxel_grid import Accumulator, unit, voxel_keys, voxel_s
 Floats = npt.NDArray[np.float32]
 NEIGHBOURS = 20  # of a normal
 COARSE_POINTS = 4000  # about as many, at equal density, carry the shape of a site
+ON_A_SURFACE = 2  # points in a coarse voxel: one alone is dust, rain, or the edge of sight
+SPACING_POINTS = 50_000  # of a cloud tell its spacing
+ALONE = 3.0  # times the usual distance to a neighbour
+FILLED = 4  # points in a coarse voxel on average; fewer are no surface any more
 WORTH_THREADS = 8000  # queries; for fewer, starting threads takes longer than it saves
-FROM_ABOVE_M = 1000.0  # where a scanner is not known, normals point up
+STEEP = 0.5  # z of a wall's normal
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,15 @@ class Cloud:
         workers = -1 if len(points_m) > WORTH_THREADS else 1
         distance_m, at = self._tree.query(points_m, distance_upper_bound=reach_m, workers=workers)
         return distance_m, at
+
+    @property
+    def spacing_m(self) -> float:
+        """Median distance of a point to the one nearest to it."""
+        return float(np.median(self.gaps_m(self.points_m[:: max(1, len(self) // 2000)], 1)))
+
+    def gaps_m(self, own_m: Floats, neighbour: int) -> Array:
+        """(N,) distance of some of the cloud's own points to their first, second, … neighbour."""
+        return np.asarray(self._tree.query(own_m, k=[neighbour + 1])[0][:, 0])
 
     def taken(self, chosen: npt.NDArray[np.int64]) -> "Cloud":
         return Cloud(self.points_m[chosen], self.normals[chosen])
@@ -69,10 +82,14 @@ def fine_cloud(blocks: Iterable[LoadedScan], voxel_m: float) -> tuple[Cloud, Loa
 
 
 def _towards(normals: Array, points_m: Array, scanner_m: Array | None) -> Array:
-    """(N, 3) the normals turned to the scanner, upwards where it is not known."""
+    """(N, 3) the normals turned to the scanner; where it is not known, walls to the middle of what it saw,
+    where it likely stood, and all else upwards."""
     if scanner_m is None:
-        scanner_m = points_m.mean(axis=0) + np.array([0.0, 0.0, FROM_ABOVE_M])
-    away = np.einsum("ij,ij->i", normals, scanner_m - points_m) < 0
+        wall = np.abs(normals[:, 2]) < STEEP
+        inwards = np.einsum("ij,ij->i", normals[:, :2], np.median(points_m[:, :2], axis=0) - points_m[:, :2])
+        away = np.where(wall, inwards, normals[:, 2]) < 0
+    else:
+        away = np.einsum("ij,ij->i", normals, scanner_m - points_m) < 0
     normals[away] *= -1
     return normals
 
@@ -86,13 +103,35 @@ def estimated_normals(points_m: Array) -> Array:
     return normals
 
 
-def coarse_voxel_m(cloud: Cloud) -> float:
-    """The spacing at which the cloud keeps about COARSE_POINTS points."""
-    some = cloud.points_m[:: max(1, len(cloud) // 50_000)]
+def coarse_voxel_m(cloud: Cloud, scanner_m: Array | None) -> float:
+    """The spacing at which the cloud keeps about COARSE_POINTS points, and each stands for several. Points
+    that have no neighbours where the scanner's steps would have put some do not count."""
+    some = cloud.taken(np.arange(0, len(cloud), max(1, len(cloud) // SPACING_POINTS)))
+    points_m = some.points_m[~_alone(some, scanner_m)]
     voxel_m = 0.05
-    while voxel_m < 5.0 and len(np.unique(voxel_keys(some, voxel_m))) > COARSE_POINTS:
+    while voxel_m < 5.0:
+        counts = np.unique(voxel_keys(points_m, voxel_m), return_counts=True)[1]
+        shared = counts[counts >= ON_A_SURFACE]
+        if len(counts) <= COARSE_POINTS and shared.sum() >= FILLED * len(shared) > 0:
+            break
         voxel_m *= 1.25
     return voxel_m
+
+
+def _alone(cloud: Cloud, scanner_m: Array | None) -> npt.NDArray[np.bool_]:
+    """(N,) points (dust, rain) whose second neighbour is ALONE times as far as is usual, by distance and, as
+    scanners step by angles, by distance over range."""
+    from_m = np.median(cloud.points_m, axis=0) if scanner_m is None else scanner_m
+    range_m = np.maximum(np.linalg.norm(cloud.points_m - from_m, axis=1), 1.0)
+    gap_m = cloud.gaps_m(cloud.points_m, 2)
+    usual_m = np.maximum(np.median(gap_m), np.median(gap_m / range_m) * range_m)
+    return np.asarray(gap_m > ALONE * usual_m)
+
+
+def on_surfaces(fine: Cloud, voxel_m: float) -> Cloud:
+    """The cloud without its lone echoes: points that have a coarse voxel to themselves."""
+    _, voxel, counts = np.unique(voxel_keys(fine.points_m, voxel_m), return_inverse=True, return_counts=True)
+    return fine.taken(np.flatnonzero(counts[voxel] >= ON_A_SURFACE))
 
 
 def coarse_cloud(fine: Cloud, voxel_m: float) -> Cloud:

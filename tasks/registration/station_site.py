@@ -14,7 +14,7 @@ from tasks.registration.cloud_shelf import Shelf, Shelved
 from tasks.registration.feature_match import Features, shape_features
 from tasks.registration.read_scan import LoadedScan
 from tasks.registration.rigid_motion import Array, inverse, pose, transform
-from tasks.registration.station_cloud import Cloud, coarse_cloud, coarse_voxel_m, fine_cloud
+from tasks.registration.station_cloud import Cloud, coarse_cloud, coarse_voxel_m, fine_cloud, on_surfaces
 
 LEAST_POINTS = 100  # fewer, at equal density, are no scan of a structure
 FEATURE_RADII = 5  # coarse voxels
@@ -67,6 +67,8 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
         prior = np.array(scan.T_world_scan) @ pose(np.eye(3), loaded.origin_m)
     elif loaded.T_world_scan is not None:
         prior = loaded.T_world_scan
+    elif loaded.origin_m.any():  # large coordinates are the world's
+        prior = pose(np.eye(3), loaded.origin_m)
     scanner_m = loaded.viewpoint_m
     position_m = None
     if scan.station_position_m is not None:
@@ -79,7 +81,7 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
         name=scan.name,
         fine=shelf.put(fine),
         sample_m=fine.points_m[:: max(1, len(fine) // OVERLAP_POINTS)].copy(),
-        coarse_voxel_m=coarse_voxel_m(fine),
+        coarse_voxel_m=coarse_voxel_m(fine, scanner_m),
         scanner_m=scanner_m,
         shift_m=loaded.origin_m,
         prior_T_world_local=prior,
@@ -90,10 +92,12 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
 
 
 def shape(site: Site, voxel_m: float) -> Shape:
+    """Lone echoes have no say on where a station may stand; fine alignment sees to its outliers itself."""
     fine = site.fine.cloud()
+    solid = on_surfaces(fine, voxel_m)
     return Shape(
-        coarse_cloud(fine, voxel_m),
+        coarse_cloud(solid, voxel_m),
         voxel_m,
         coarse_cloud(fine, voxel_m / 4),
-        visibility.range_image(fine, site.scanner_m),
+        visibility.range_image(solid, site.scanner_m),
     )

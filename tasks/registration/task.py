@@ -10,6 +10,7 @@ from artifacts.picture import markdown_of
 from schemas.contract import Matrix4, Vector3
 from schemas.file import File
 from schemas.problem import BadInput
+from schemas.raster import Pixels
 from schemas.registered_model import RegisteredModel
 from schemas.scan import Scan
 from schemas.settings import RegistrationSettings
@@ -34,7 +35,7 @@ def ingest_scan(
     unit_m: metres per unit of the file's coordinates; where it is 1 and the file itself states another
     (LAS, LAZ), the file's holds. BadInput where no scan of the file can be used.
     """
-    from tasks.registration.read_scan import scan_blocks, scan_count, stated_unit_m
+    from tasks.registration.read_scan import scan_blocks, scan_count, stated_unit_m, stated_utm_zone
 
     path = store.current().path(file)
     count = scan_count(path, name)
@@ -46,6 +47,7 @@ def ingest_scan(
         )
     if unit_m == 1.0:
         unit_m = stated_unit_m(path, name) or unit_m
+    utm_zone = stated_utm_zone(path, name)
     scans = tuple(
         Scan(
             name=name if count == 1 else f"{name}-{index + 1}",
@@ -54,6 +56,7 @@ def ingest_scan(
             unit_m=unit_m,
             station_position_m=station_position_m,
             T_world_scan=T_world_scan,
+            utm_zone=utm_zone,
             targets=targets,
         )
         for index in range(count)
@@ -73,13 +76,10 @@ def ingest_scan(
 
 
 def pages(inputs: Mapping[str, Any], model: RegisteredModel) -> list[Page]:
-    from tasks.registration.picture import draw_model
-
-    points_m, station = cloud_sample(store.current().path(model.cloud))
     title = f"### {len(model.stations)} stations, {model.points:,} points"
     left_out = "".join(f"\n- left out: **{one.item}**, {one.what}" for one in model.left_out)
-    picture = markdown_of(draw_model(model, points_m, station), "the model, coloured by station")
-    shown = [Page(key="registered-model", markdown=f"{title}\n{_of_targets(model)}{left_out}\n\n{picture}")]
+    drawn = markdown_of(picture(model), "the model, coloured by station")
+    shown = [Page(key="registered-model", markdown=f"{title}\n{_of_targets(model)}{left_out}\n\n{drawn}")]
     stations = [
         {
             "station": one.name,
@@ -106,6 +106,13 @@ def pages(inputs: Mapping[str, Any], model: RegisteredModel) -> list[Page]:
     ]
     tables: dict[str, list[dict[str, Any]]] = {"stations": stations, "pairs": pairs, "targets": targets}
     return shown + [Page(key=f"registered-{key}", table=rows) for key, rows in tables.items() if rows]
+
+
+def picture(model: RegisteredModel) -> Pixels:
+    """(H, W, 3) RGB of the model, coloured by station."""
+    from tasks.registration.picture import draw_model
+
+    return draw_model(model, *cloud_sample(store.current().path(model.cloud)))
 
 
 def _of_targets(model: RegisteredModel) -> str:
@@ -140,9 +147,12 @@ def register(
         )
         cloud = here.put(found.model.path)
     low_m, high_m = found.model.low_m, found.model.high_m
+    of_files = {scan.utm_zone for scan in scans if scan.T_world_scan is None} - {None}
+    in_its_grid = len(of_files) == 1 and found.origin_m.any() and all(target.check for target in targets)
     return RegisteredModel(
         cloud=cloud,
         origin_m=(float(found.origin_m[0]), float(found.origin_m[1]), float(found.origin_m[2])),
+        utm_zone=of_files.pop() if in_its_grid else None,
         stations=found.stations,
         pairs=found.pairs,
         targets=found.targets,

@@ -15,6 +15,7 @@ from tasks.registration.rigid_motion import Array, inverse, transform
 from tasks.registration.station_cloud import balanced_sample
 from tasks.registration.station_site import Shape, Site
 
+SPACINGS = 2.0  # τ is at least so many of the target's own: a sparse cloud has no point nearer
 FINE_POINTS = 30_000  # of a source in fine alignment: 3 mm noise averages out to hundredths
 
 
@@ -56,17 +57,20 @@ def aligned(
 
 
 def ties(sites: Sequence[Site], edges: Sequence[Edge], settings: RegistrationSettings) -> list[Tie]:
-    """The edges whose stations overlap by τ as much as is asked; each fine cloud is taken once."""
+    """The edges whose stations overlap by τ as much as is asked; each fine cloud is taken once. Where a cloud
+    is sparser than τ, its own spacing takes τ's place."""
     near: dict[tuple[int, int], float] = {}  # share of the first station's points near one of the second
     for station, site in enumerate(sites):
         touching = [e for e in edges if station in (e.source, e.target)]
-        cloud = site.fine.cloud() if touching else None
+        if not touching:
+            continue
+        cloud = site.fine.cloud()
+        tau_m = max(settings.tau_m, SPACINGS * cloud.spacing_m)
         for edge in touching:
-            assert cloud is not None
             other, T = edge.source, edge.T_target_source
             if station == edge.source:
                 other, T = edge.target, inverse(T)
-            share = overlapping(sites[other].sample_m, cloud, T, settings.tau_m).mean()
+            share = overlapping(sites[other].sample_m, cloud, T, tau_m).mean()
             near[other, station] = float(share)
     found = []
     for edge in edges:

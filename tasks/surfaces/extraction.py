@@ -21,7 +21,7 @@ from tasks.surfaces.naming import name_surfaces
 from tasks.surfaces.obstacles import obstacles, on_surfaces
 from tasks.surfaces.outliers import sparse_outliers
 from tasks.surfaces.patches import Patch, patches
-from tasks.surfaces.ransac import find_planes
+from tasks.surfaces.ransac import Support, find_planes
 from tasks.surfaces.structure import of_structure
 from tasks.surfaces.terrain import Terrain, find_terrain
 from tasks.surfaces.voxels import thin, voxelise
@@ -104,6 +104,20 @@ def _flat_patches(
     on_progress: Callable[[float], None],
 ) -> list[Patch]:
     """Planes found at equal density off the ground, then cut into surfaces and fitted on all their points."""
+    planes, voxels = flat_planes(equal, terrain, settings, lambda f: on_progress(0.5 * f))
+    supports = _points_of(voxels, voxel_of)
+    narrowest_m, smallest_m2 = SLIVER * settings.distance_m, settings.min_area_m2
+    found: list[Patch] = []
+    for number, (plane, support) in enumerate(zip(planes, supports, strict=True)):
+        on_progress(0.5 + 0.5 * number / len(planes))
+        found += patches(cloud.points, support, plane.normal, narrowest_m, _cell_m(settings), smallest_m2)
+    return found
+
+
+def flat_planes(
+    equal: Cloud, terrain: Terrain, settings: SurfaceSettings, on_progress: Callable[[float], None]
+) -> tuple[list[Support], list[Indices]]:
+    """The planes off the ground of a cloud at equal density, and the indices of the points on each."""
     cell_m = _cell_m(settings)
     standing = np.ones(len(equal), dtype=bool)
     standing[np.concatenate([[], *terrain.pieces]).astype(np.int64)] = False
@@ -112,20 +126,11 @@ def _flat_patches(
         large = in_large_groups(equal.points[searched], settings.epsilon_m, settings.min_area_m2)
         searched = searched[large]
     part = equal[searched]
-    planes = find_planes(
-        part, settings.distance_m, cell_m, settings.min_area_m2, settings.seed, lambda f: on_progress(0.5 * f)
-    )
+    planes = find_planes(part, settings.distance_m, cell_m, settings.min_area_m2, settings.seed, on_progress)
     planes = merge_planes(planes, part, settings.distance_m, cell_m)
     planes = without_slivers(planes, part, settings.distance_m)
     planes = cut_curves(planes, part, settings.distance_m, cell_m)
-    voxels = with_edge_points(planes, part, settings.distance_m)
-    supports = _points_of([searched[own] for own in voxels], voxel_of)
-    found: list[Patch] = []
-    for number, (plane, support) in enumerate(zip(planes, supports, strict=True)):
-        on_progress(0.5 + 0.5 * number / len(planes))
-        narrowest_m = SLIVER * settings.distance_m
-        found += patches(cloud.points, support, plane.normal, narrowest_m, cell_m, settings.min_area_m2)
-    return found
+    return planes, [searched[own] for own in with_edge_points(planes, part, settings.distance_m)]
 
 
 def _cell_m(settings: SurfaceSettings) -> float:

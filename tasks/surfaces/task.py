@@ -8,6 +8,7 @@ import numpy as np
 from artifacts import store
 from artifacts.page import Page
 from artifacts.picture import markdown_of
+from schemas.raster import Pixels
 from schemas.registered_model import RegisteredModel
 from schemas.settings import SurfaceSettings
 from schemas.structure import Structure
@@ -15,10 +16,8 @@ from tasks.stage import progress, stage
 
 
 def pages(inputs: Mapping[str, Any], structure: Structure) -> list[Page]:
-    from tasks.surfaces.picture import draw_structure
-
     title = f"### {len(structure.surfaces)} surfaces, {len(structure.obstacles)} obstacles"
-    picture = markdown_of(draw_structure(structure), "surfaces in colour, from above and from below")
+    drawn = markdown_of(picture(structure), "surfaces in colour, from above and from below")
     rows = [
         {
             "surface": surface.name,
@@ -31,7 +30,14 @@ def pages(inputs: Mapping[str, Any], structure: Structure) -> list[Page]:
         }
         for surface in structure.surfaces
     ]
-    return [Page(key="surfaces", markdown=f"{title}\n\n{picture}"), Page(key="surfaces-table", table=rows)]
+    return [Page(key="surfaces", markdown=f"{title}\n\n{drawn}"), Page(key="surfaces-table", table=rows)]
+
+
+def picture(structure: Structure) -> Pixels:
+    """(H, W, 3) RGB of the surfaces in colour with their names, and the obstacles."""
+    from tasks.surfaces.picture import draw_structure
+
+    return draw_structure(structure)
 
 
 @stage(pages=pages)
@@ -56,5 +62,7 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
         min_m=model.min_m,
         max_m=model.max_m,
         stations_m=tuple((float(e), float(n), float(u)) for e, n, u in scanners(cloud, stations_m)),
+        world_origin_m=model.origin_m,
+        utm_zone=model.utm_zone,
         left_out=model.left_out,
     )

@@ -6,10 +6,8 @@ What is not on this machine, a set or a peer, is a row that says so.
 """
 
 import importlib.util
-import json
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -19,9 +17,12 @@ import numpy.typing as npt
 from flows.console import out
 from flows.evaluate_command import ALL, as_table
 from schemas.settings import DetectSettings
-from tasks.assessment.evaluation import evaluate
+from tasks.assessment.evaluation import evaluate, near
+from tasks.detection.components import components
 from tasks.detection.detect import detect_image
-from tasks.detection.sauvola import grey_of
+from tasks.detection.sauvola import grey_of, sauvola
+from tests.benchmarks import wall_rows
+from tests.benchmarks.table import Row, absent, gather, row
 from tests.development_data import ROOT
 from training.photos import by_fold
 from training.surfaces import surface
@@ -36,7 +37,8 @@ BARS = {
 GSD_MM_PX = 0.5
 SURFACES, FIRST_SEED = 100, 960_000  # crack-free, unseen by training and calibration
 FALSE_PER_10_M2 = 1.0
-SPEED_BARS = {"paper": 0.6, "ridge": 18.0, "hairline": 25.0}  # × doxapy's Sauvola
+NEAR_PX = 5  # of a drawn crack: not a crack-free part
+SPEED_BARS = {"Sauvola": 0.6, "ridge": 18.0, "hairline": 25.0}  # × doxapy's Sauvola
 SPEED_MP = 4.0
 
 Pixels = npt.NDArray[np.uint8]
@@ -44,14 +46,8 @@ Mask = npt.NDArray[np.bool_]
 Finder = Callable[[Pixels], Mask]
 
 
-def main() -> None:
-    finders = {**{name: _ours(settings) for name, settings in ALL.items()}, **peers()}
-    rows = [row for name in SETS for row in on_photos(name, finders)]
-    rows += false_cracks() + speed(finders)
-    path = Path("build/bench/detection.json")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(rows, indent=1) + "\n")
-    out.print(f"\n{path}")
+def finders() -> dict[str, Finder]:
+    return {**{name: _ours(settings) for name, settings in ALL.items()}, **peers()}
 
 
 def _ours(settings: DetectSettings) -> Finder:
@@ -103,50 +99,41 @@ def _ridges(of: Callable[..., Any], otsu: Callable[..., Any]) -> Finder:
     return find
 
 
-def on_photos(name: str, finders: dict[str, Finder]) -> list[dict[str, Any]]:
-    folder = ROOT / "cracks" / name.split(",")[0]
-    if not folder.is_dir():
-        return [{"what": f"F1 on {name}", "value": None, "data": "not on this machine"}]
-    names = None
-    if "fold" in name:
-        names = by_fold(folder / "groups.txt")[int(name.split()[-1])]
+def photos() -> Iterator[Row]:
+    """F1 with its interval and length found and true, of every method and peer on every set."""
+    for name in SETS:
+        yield from on_photos(name)
+
+
+def on_photos(name: str) -> Iterator[Row]:
+    if not (ROOT / "cracks" / name.split(",")[0]).is_dir():
+        yield absent(f"F1 on {name}", "", "the set is not on this machine")
+        return
     evaluations = []
-    for finder in finders:
-        pairs = ((finders[finder](rgb), truth) for rgb, truth in _pairs(folder, names))
-        evaluations += evaluate(finder, pairs)
-    out.print(f"\n{name}, {evaluations[0].images} images")
+    for method, find in finders().items():
+        pairs = ((find(rgb), truth) for rgb, truth in _of_set(name))
+        evaluations += evaluate(method, pairs)
     out.print(as_table(evaluations))
-    rows = []
-    best = max(e.aggregate.f1 for e in evaluations if e.method in finders and e.method not in ALL)
+    best = {
+        d: max(e.aggregate.f1 for e in evaluations if e.method not in ALL and e.tolerance_px == d)
+        for d in (0, 2, 5)
+    }
     for one in evaluations:
-        bar = BARS.get((one.method, name), (None, None)) if one.tolerance_px < 5 else (None,)
-        least = bar[min(one.tolerance_px, len(bar) - 1, 1)]
+        d = one.tolerance_px
+        bars = BARS.get((one.method, name))
+        bar = f"≥ {bars[d > 0]:g}" if bars and d < 5 else None
         low, high = one.f1_interval
-        figures = {
-            "F1": one.aggregate.f1,
-            "length found": one.length.recall,
-            "length true": one.length.precision,
-        }
-        for what, value in figures.items():
-            asked = least if what == "F1" else None
-            rows.append(
-                {
-                    "what": f"{what} of {one.method} at {one.tolerance_px} px",
-                    "value": round(value, 3),
-                    "unit": "1",
-                    "bar": asked,
-                    "holds": None if asked is None else value >= asked,
-                    "interval": [low, high] if what == "F1" else None,
-                    "peer": "the best peer at 0 px",
-                    "peer_value": round(best, 3) if what == "F1" and one.tolerance_px == 0 else None,
-                    "data": name,
-                    "seed": None,
-                }
-            )
-    return rows
+        what = f"F1 of {one.method} at {d} px, 95 % in {low:.2f}–{high:.2f}"
+        peer = "the best peer" if one.method in ALL else None
+        yield row(what, one.aggregate.f1, "1", bar, name, None, peer, best[d] if peer else None)
+        yield row(f"length found by {one.method} at {d} px", one.length.recall, "1", None, name, None)
+        yield row(f"length of {one.method} true at {d} px", one.length.precision, "1", None, name, None)
 
 
-def _pairs(folder: Path, names: list[str] | None) -> Iterator[tuple[Pixels, Mask]]:
+def _of_set(name: str) -> Iterator[tuple[Pixels, Mask]]:
+    """Photos and what somebody drew on them; "SET, fold N": one fold of the set, by group."""
+    folder = ROOT / "cracks" / name.split(",")[0]
+    names = by_fold(folder / "groups.txt")[int(name.split()[-1])] if "fold" in name else None
     masks = {path.stem: path for path in (folder / "masks").iterdir()}
     for path in sorted((folder / "images").iterdir()):
         if names is None or path.name in names:
@@ -155,36 +142,52 @@ def _pairs(folder: Path, names: list[str] | None) -> Iterator[tuple[Pixels, Mask
             yield np.ascontiguousarray(bgr[..., ::-1]), truth
 
 
-def false_cracks() -> list[dict[str, Any]]:
-    """Found where the simulator drew none: cast, rough, smooth, wood, brick, and all that lies on them."""
-    methods = {name: ALL[name] for name in ("hairline", "ridge", "paper")}
+def false_cracks() -> Iterator[Row]:
+    """Found where the simulator drew none: cast, rough, smooth, wood, brick, and all that lies on them; of
+    the network for each least score."""
+    methods = {name: ALL[name] for name in ("ridge", "paper")}
     found = dict.fromkeys(methods, 0)
+    scores: list[float] = []
     area_m2 = 0.0
     for seed in range(FIRST_SEED, FIRST_SEED + SURFACES):
         rgb, _ = surface(seed, crack_free=True)
         area_m2 += rgb.shape[0] * rgb.shape[1] * (GSD_MM_PX / 1000) ** 2
+        all_of_them = detect_image(rgb, None, DetectSettings(min_score=0.0), GSD_MM_PX)
+        scores += [one.score for one in all_of_them.scores]
         for name, settings in methods.items():
             mask = detect_image(rgb, None, settings, GSD_MM_PX).mask
             found[name] += cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)[0] - 1
-    rows = []
+    data, seed_text = f"{area_m2:.1f} m² of simulated surface at {GSD_MM_PX} mm/px", f"{FIRST_SEED}…"
+    default = DetectSettings().min_score
+    for least in sorted({default, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7, 0.8, 0.9}):
+        rate = 10 * sum(score >= least for score in scores) / area_m2
+        bar = f"≤ {FALSE_PER_10_M2:g}" if least == default else None
+        yield row(f"false cracks of hairline, least score {least}", rate, "1/10 m²", bar, data, seed_text)
     for name, count in found.items():
-        rate = 10 * count / area_m2
-        out.print(f"{name}: {rate:.1f} false cracks per 10 m² on {area_m2:.1f} m² of simulated surface")
-        rows.append(
-            {
-                "what": f"false cracks of {name} per 10 m²",
-                "value": round(rate, 2),
-                "unit": "1/10 m²",
-                "bar": FALSE_PER_10_M2 if name == "hairline" else None,
-                "holds": rate <= FALSE_PER_10_M2 if name == "hairline" else None,
-                "data": f"{SURFACES} simulated surfaces without cracks, 0.5 mm/px assumed",
-                "seed": FIRST_SEED,
-            }
-        )
-    return rows
+        yield row(f"false cracks of {name}", 10 * count / area_m2, "1/10 m²", None, data, seed_text)
 
 
-def speed(finders: dict[str, Finder]) -> list[dict[str, Any]]:
+def false_on_photos() -> Iterator[Row]:
+    """Found on the crack-free parts of real photos: away from every crack that somebody drew."""
+    for name in ("uav, fold 0", "deepcrack_train"):
+        if not (ROOT / "cracks" / name.split(",")[0]).is_dir():
+            yield absent(f"false cracks on {name}", "", "the set is not on this machine")
+            continue
+        found, free_px = 0, 0
+        for rgb, truth in _of_set(name):
+            mask = detect_image(rgb, None, ALL["hairline"], GSD_MM_PX).mask
+            drawn = near(truth, NEAR_PX)
+            free_px += int((~drawn).sum())
+            pieces = components(mask)
+            on_drawn = np.bincount(pieces.labels[drawn], minlength=len(pieces.area_px)) / pieces.area_px
+            found += int((on_drawn[1:] < 0.5).sum())
+        area_m2 = free_px * (GSD_MM_PX / 1000) ** 2
+        data = f"{area_m2:.1f} m² of {name}, {GSD_MM_PX} mm/px assumed"
+        rate, bar = 10 * found / area_m2, f"≤ {FALSE_PER_10_M2:g}"
+        yield row("false cracks of hairline away from what was drawn", rate, "1/10 m²", bar, data, None)
+
+
+def speed() -> Iterator[Row]:
     """CPU milliseconds per megapixel on a textured image, one thread; the best of three."""
     side = round((SPEED_MP * 1e6) ** 0.5)
     rgb, _ = surface(FIRST_SEED)
@@ -192,7 +195,8 @@ def speed(finders: dict[str, Finder]) -> list[dict[str, Any]]:
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)
     spent = {}
-    for name, find in finders.items():
+    thresholds = {"Sauvola": lambda image: sauvola(grey_of(image), 63, 0.5, 128.0)}
+    for name, find in {**finders(), **thresholds}.items():
         times = []
         for _ in range(3):
             began = time.process_time()
@@ -201,26 +205,21 @@ def speed(finders: dict[str, Finder]) -> list[dict[str, Any]]:
         spent[name] = 1e3 * min(times) / SPEED_MP
     cv2.setNumThreads(before)
     peer = spent.get("doxapy Sauvola")
-    rows = []
+    data = f"{SPEED_MP:.0f} MP, simulated"
     for name, ms in spent.items():
-        bar = SPEED_BARS.get(name)
-        ratio = ms / peer if peer else None
-        out.print(f"{name}: {ms:.1f} ms/MP" + (f", {ratio:.1f} × doxapy's Sauvola" if ratio else ""))
-        rows.append(
-            {
-                "what": f"time of {name}",
-                "value": round(ms, 1),
-                "unit": "ms/MP",
-                "bar": f"{bar} × the peer" if bar else None,
-                "holds": ratio <= bar if bar and ratio else None,
-                "peer": "doxapy Sauvola",
-                "peer_value": round(peer, 1) if peer else None,
-                "data": f"{SPEED_MP:.0f} MP, simulated",
-                "seed": FIRST_SEED,
-            }
-        )
-    return rows
+        yield row(f"time of {name}", ms, "ms/MP", None, data, f"{FIRST_SEED}")
+        if peer and name in SPEED_BARS:
+            times_peer, bar = ms / peer, f"≤ {SPEED_BARS[name]:g}"
+            yield row(f"time of {name}", times_peer, "× doxapy's Sauvola", bar, data, None, "doxapy", peer)
 
+
+PARTS = {
+    "photos": photos,
+    "false-cracks": false_cracks,
+    "false-on-photos": false_on_photos,
+    "speed": speed,
+    "walls": wall_rows.rows,
+}
 
 if __name__ == "__main__":
-    main()
+    gather("detection", PARTS)

@@ -21,8 +21,7 @@ from tasks.registration.read_scan import read_scan
 from tasks.registration.register import Registration
 from tasks.registration.rigid_motion import Array, angle_deg, exp, inverse, transform, yaw
 from tasks.registration.station_site import shape
-from tasks.simulation import arch, bridge
-from tasks.simulation.scan_faults import every_fault
+from tasks.simulation import arch, bridge, scan_faults
 from tests.benchmarks.registration_peers import (
     BLIND,
     FINE,
@@ -44,6 +43,7 @@ from tests.benchmarks.table import Row, row
 SEEDS = range(1, 6)
 REFUSAL_SEEDS = range(1, 11)
 STEP_DEG = 0.25  # about 400,000 points a scan
+GROWTH_STEPS_DEG = (0.6, 0.42, 0.3, 0.21)
 COARSE_STEP_DEG = 0.6  # where only yes or no is asked
 RIGHT_DEG, RIGHT_M = 1.0, 0.3
 EVERY = 4  # one pair of so many is placed blindly by peers too
@@ -52,26 +52,11 @@ TARGET_SIGMA_M = 0.001  # of a target's centre in a scan
 IN_99 = 16.81  # of χ² with six degrees of freedom
 
 
-def rows() -> Iterator[Row]:
-    """All rows, as DESIGN.md's benchmarks have them."""
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        yield from _nine_stations(folder)
-        yield from _every_fault(folder)
-        yield from _wrong_pose(folder)
-        yield from _refusals(folder)
-        yield from _growth(folder)
-
-
-def _nine_stations(folder: Path) -> Iterator[Row]:
-    """Positions known to 5 cm; then targets; then no poses at all, whole and pair by pair."""
-    checks, worst, cpu, unity, inside, control, judged = ([] for _ in range(7))
+def known_positions() -> Iterator[Row]:
+    """Positions known to 5 cm, beside the same edges by others."""
+    checks, worst, cpu, unity, inside = ([] for _ in range(5))
     peers: dict[Gicp, list[tuple[float, float, float]]] = {PLAIN: [], FINE: []}
-    blind_checks, blind_worst, blind_cpu, blind_missing = [], [], [], 0
-    pairs_right: dict[str, list[bool]] = {"ours": [], **{name: [] for name in BLIND}}
-    ours_on_some: list[bool] = []
-    for seed in SEEDS:
-        case = survey(nine_station_bridge(seed), Scanning(step_deg=STEP_DEG), folder / str(seed))
+    for seed, case in _surveys("known"):
         found, T, cpu_s = registered(case)
         errors = pose_errors(T, case)
         checks.append(errors.check_mm)
@@ -86,100 +71,96 @@ def _nine_stations(folder: Path) -> Iterator[Row]:
             edges, peer_s = edges_of(gicp, scans_m, pairs)
             peer = pose_errors(_adjusted(found, pairs, edges), case)
             of_seeds.append((peer.check_mm, max(peer.station_mm.values()), cpu_s / peer_s))
-        with_targets, surveyed = _with_targets(case, seed)
-        tied, _, _ = registered(with_targets, surveyed)
-        of_target = {r.name: 1000 * float(np.linalg.norm(r.residual_m)) for r in tied.targets}
-        missed = [r for r in tied.targets if not r.check and not r.used]
-        assert not missed and of_target
-        for check, into in ((False, control), (True, judged)):
-            into.append(
-                1000
-                * float(
-                    np.sqrt(
-                        np.mean([np.square(r.residual_m).sum() for r in tied.targets if r.check == check])
-                    )
-                )
-            )
-        blind = case.without_positions()
-        found_blind, T_blind, blind_s = registered(blind)
-        errors = pose_errors(T_blind, case)
-        blind_checks.append(errors.check_mm)
-        blind_worst.append(max(errors.station_mm.values()))
-        blind_cpu.append(blind_s)
-        blind_missing += len(found_blind.left_out)
-        for k, (source, target, _) in enumerate(pairs):
-            some = k % EVERY == 0
-            truth = inverse(case.T_world_scan[target]) @ case.T_world_scan[source]
-            right = _right(_placed_blindly(blind.of((source, target)), source, target), truth)
-            pairs_right["ours"].append(right)
-            if some:
-                ours_on_some.append(right)
-                for name, of_peer in BLIND.items():
-                    T_peer = of_peer(scans_m[source], scans_m[target], 0.5)
-                    pairs_right[name].append(_right(T_peer, truth))
-    data, seeds = "simulated bridge, 9 stations", f"{len(SEEDS)} seeds"
-    known: dict[str, Any] = {"data": data, "seed": seeds}
+    known = _bridge(f"{len(SEEDS)} seeds")
+    ours = {"check points": ("mm RMSE", _median(checks)), "worst station": ("mm", _median(worst))}
     for gicp, of_seeds in peers.items():
         check, station, ratio = np.median(np.array(of_seeds), axis=0)
         theirs = f"{gicp.name}, same edges, our pose graph"
-        yield row(
-            "positions to 5 cm: check points",
-            _median(checks),
-            "mm RMSE",
-            "≤ 2",
-            **known,
-            peer=theirs,
-            peer_value=check,
-        )
-        yield row(
-            "positions to 5 cm: worst station",
-            _median(worst),
-            "mm",
-            "≤ 2",
-            **known,
-            peer=theirs,
-            peer_value=station,
-        )
+        for (what, (unit, value)), peer_value in zip(ours.items(), (check, station), strict=True):
+            yield row(
+                f"positions to 5 cm: {what}", value, unit, "≤ 2", **known, peer=theirs, peer_value=peer_value
+            )
         bar = "≤ 1.3" if station <= 2.0 else None  # a peer that misses the accuracy is no measure of time
-        yield row(
-            "positions to 5 cm: CPU time, to the peer's",
-            ratio,
-            "1",
-            bar,
-            **known,
-            peer=theirs,
-            peer_value=1.0,
-        )
+        what = "positions to 5 cm: CPU time, to the peer's"
+        yield row(what, ratio, "1", bar, **known, peer=theirs, peer_value=1.0)
     yield row("positions to 5 cm: CPU time", _median(cpu), "s", None, **known)
     yield row("covariances: mean d²/6", float(np.mean(unity)), "1", None, **known)
     yield row("covariances: inside 99 %", float(np.mean(inside)), "%", None, **known)
+
+
+def targets() -> Iterator[Row]:
+    """The datum by surveyed targets."""
+    control, judged = [], []
+    for seed, case in _surveys("targets", COARSE_STEP_DEG):
+        with_targets, surveyed = _with_targets(case, seed)
+        tied, _, _ = registered(with_targets, surveyed)
+        missed = [r for r in tied.targets if not r.check and not r.used]
+        assert not missed and tied.targets
+        for check, into in ((False, control), (True, judged)):
+            squares = [np.square(r.residual_m).sum() for r in tied.targets if r.check == check]
+            into.append(1000 * float(np.sqrt(np.mean(squares))))
+    known = _bridge(f"{len(SEEDS)} seeds", COARSE_STEP_DEG)
     what = f"{TARGETS} targets to {1000 * TARGET_SIGMA_M:g} mm"
     yield row(f"{what}: control", _median(control), "mm RMSE", None, **known)
     yield row(f"{what}: check points in the datum", _median(judged), "mm RMSE", None, **known)
-    yield row("no poses: check points", _median(blind_checks), "mm RMSE", "≤ 2", **known)
-    yield row("no poses: worst station", _median(blind_worst), "mm", "≤ 2", **known)
-    yield row("no poses: stations lost", blind_missing, "stations", "≤ 0", **known)
-    yield row("no poses: CPU time", _median(blind_cpu), "s", None, **known)
-    everything = f"{len(pairs_right['ours'])} pairs of {seeds}"
+
+
+def no_poses() -> Iterator[Row]:
+    """Nothing known: the whole set."""
+    checks, worst, cpu, missing = [], [], [], 0
+    for _, case in _surveys("blind"):
+        found, T, cpu_s = registered(case.without_positions())
+        errors = pose_errors(T, case)
+        checks.append(errors.check_mm)
+        worst.append(max(errors.station_mm.values()))
+        cpu.append(cpu_s)
+        missing += len(found.left_out)
+    known = _bridge(f"{len(SEEDS)} seeds")
+    yield row("no poses: check points", _median(checks), "mm RMSE", "≤ 2", **known)
+    yield row("no poses: worst station", _median(worst), "mm", "≤ 2", **known)
+    yield row("no poses: stations lost", missing, "stations", "≤ 0", **known)
+    yield row("no poses: CPU time", _median(cpu), "s", None, **known)
+
+
+def blind_pairs() -> Iterator[Row]:
+    """Nothing known: each overlapping pair for itself, before the fine step."""
+    right: dict[str, list[bool]] = {"ours": [], **{name: [] for name in BLIND}}
+    ours_on_some: list[bool] = []
+    for _, case in _surveys("pairs", COARSE_STEP_DEG):
+        found, _, _ = registered(case)
+        pairs = [(p.source, p.target) for p in found.pairs]
+        placed = _placed_blindly(case.without_positions(), pairs)
+        scans_m = {one.name: read_scan(path).points_m for one, path in case.given}
+        for k, (source, target) in enumerate(pairs):
+            truth = inverse(case.T_world_scan[target]) @ case.T_world_scan[source]
+            right["ours"].append(_right(placed[k], truth))
+            if k % EVERY == 0:
+                ours_on_some.append(right["ours"][-1])
+                for name, of_peer in BLIND.items():
+                    right[name].append(_right(of_peer(scans_m[source], scans_m[target], 0.5), truth))
+    seeds = f"{len(SEEDS)} seeds"
+    what = "no poses: pairs right before the fine step"
     yield row(
-        "no poses: pairs right before the fine step",
-        _share(pairs_right["ours"]),
+        what,
+        _share(right["ours"]),
         "%",
         "≥ 95",
-        data,
-        everything,
+        **_bridge(f"{len(right['ours'])} pairs of {seeds}", COARSE_STEP_DEG),
     )
+    known = _bridge(f"{len(ours_on_some)} pairs of {seeds}", COARSE_STEP_DEG)
+    what = f"no poses: pairs right, of every {EVERY}th"
     for name in BLIND:
-        yield row("no poses: pairs right, of every fourth", _share(ours_on_some), "%", "≥ 95", data,
-                   f"{len(ours_on_some)} pairs of {seeds}", name, _share(pairs_right[name]))  # fmt: skip
+        peer = {"peer": name, "peer_value": _share(right[name])}
+        yield row(what, _share(ours_on_some), "%", "≥ 95", **known, **peer)
 
 
-def _every_fault(folder: Path) -> Iterator[Row]:
+def every_fault() -> Iterator[Row]:
     checks, worst, lost = [], [], 0
     for seed in SEEDS:
-        scanning = every_fault(seed).model_copy(update={"step_deg": STEP_DEG})
-        case = survey(nine_station_bridge(seed), scanning, folder / f"faults-{seed}")
-        found, T, _ = registered(case)
+        scanning = scan_faults.every_fault(seed).model_copy(update={"step_deg": STEP_DEG})
+        with TemporaryDirectory() as name:
+            case = survey(nine_station_bridge(seed), scanning, Path(name))
+            found, T, _ = registered(case)
         errors = pose_errors(T, case)
         checks.append(errors.check_mm)
         worst.append(max(errors.station_mm.values()))
@@ -193,12 +174,10 @@ def _every_fault(folder: Path) -> Iterator[Row]:
     yield row("every fault: stations lost", lost, "stations", "≤ 0", **known)
 
 
-def _wrong_pose(folder: Path) -> Iterator[Row]:
+def wrong_pose() -> Iterator[Row]:
     """All poses stated, one wrong by 10 m and 180°."""
     worst, lost = [], 0
-    for seed in SEEDS:
-        scene = nine_station_bridge(seed)
-        case = survey(scene, Scanning(step_deg=COARSE_STEP_DEG), folder / f"wrong-{seed}")
+    for seed, case in _surveys("wrong", COARSE_STEP_DEG):
         given = []
         for k, (one, path) in enumerate(case.given):
             T = case.T_world_scan[one.name]
@@ -208,65 +187,99 @@ def _wrong_pose(folder: Path) -> Iterator[Row]:
         found, T_found, _ = registered(Survey(tuple(given), case.T_world_scan, case.checks_m))
         lost += len(found.left_out)
         worst.append(max(pose_errors(T_found, case).station_mm.values()))
-    known: dict[str, Any] = {
-        "data": f"simulated bridge, 9 stations, {COARSE_STEP_DEG}° steps",
-        "seed": f"{len(SEEDS)} seeds",
-    }
+    known = _bridge(f"{len(SEEDS)} seeds", COARSE_STEP_DEG)
     yield row("one pose wrong by 10 m and 180°: worst station", _median(worst), "mm", "≤ 2", **known)
     yield row("one pose wrong by 10 m and 180°: stations lost", lost, "stations", "≤ 0", **known)
 
 
-def _refusals(folder: Path) -> Iterator[Row]:
+def refusals() -> Iterator[Row]:
     """Ten times a station of another place among six of the bridge, ten times three among them."""
     right = []
+    scanning = Scanning(step_deg=COARSE_STEP_DEG)
     for seed in REFUSAL_SEEDS:
-        scanning = Scanning(step_deg=COARSE_STEP_DEG)
-        ours = survey(bridge.bridge(seed), scanning, folder / f"refusal-{seed}")
-        others = survey(arch.arch(seed), scanning, folder / f"refusal-{seed}", "other-")
-        for strangers in (1, 3):
-            chosen = [others.given[(seed + k) % len(others.given)] for k in range(strangers)]
-            mixed = Survey((*ours.given, *chosen), {}, {}).without_positions()
-            found, _, _ = registered(mixed)
-            right.append(
-                {s.name for s in found.stations} == {one.name for one, _ in ours.given}
-                and {left.item for left in found.left_out} == {one.name for one, _ in chosen}
-            )
+        with TemporaryDirectory() as name:
+            ours = survey(bridge.bridge(seed), scanning, Path(name))
+            others = survey(arch.arch(seed), scanning, Path(name), "other-")
+            right += _refused(ours, others, seed)
     data = f"simulated bridge and arch, {COARSE_STEP_DEG}° steps, no poses"
     what = "stations of another structure refused by name, the bridge's all kept"
     yield row(what, sum(right), f"of {len(right)}", f"≥ {len(right)}", data, f"{len(REFUSAL_SEEDS)} seeds")
 
 
-def _growth(folder: Path) -> Iterator[Row]:
+def _refused(ours: Survey, others: Survey, seed: int) -> list[bool]:
+    right = []
+    for strangers in (1, 3):
+        chosen = [others.given[(seed + k) % len(others.given)] for k in range(strangers)]
+        mixed = Survey((*ours.given, *chosen), {}, {}).without_positions()
+        found, _, _ = registered(mixed)
+        right.append(
+            {s.name for s in found.stations} == {one.name for one, _ in ours.given}
+            and {left.item for left in found.left_out} == {one.name for one, _ in chosen}
+        )
+    return right
+
+
+def growth() -> Iterator[Row]:
     """Exponents of CPU time, by the slope of a line through logarithms."""
     points, seconds = [], []
-    for step_deg in (0.6, 0.42, 0.3, 0.21):
-        case = survey(nine_station_bridge(1), Scanning(step_deg=step_deg), folder / f"step-{step_deg}")
-        found, _, cpu_s = registered(case)
+    for step_deg in GROWTH_STEPS_DEG:
+        for _, case in _surveys("points", step_deg, SEEDS[:1]):
+            found, _, cpu_s = registered(case)
         points.append(sum(s.points for s in found.stations))
         seconds.append(cpu_s)
     data = f"simulated bridge, 9 stations, {points[0]:,} to {points[-1]:,} points"
     yield row("growth of CPU time with points", _slope(points, seconds), "exponent", "≤ 1.15", data, "1")
     pairs, seconds = [], []
-    case = survey(nine_station_bridge(1), Scanning(step_deg=COARSE_STEP_DEG), folder / "pairs")
-    for stations in (4, 6, 7, 9):
-        found, _, cpu_s = registered(Survey(case.given[:stations], case.T_world_scan, case.checks_m))
-        pairs.append(len(found.pairs))
-        seconds.append(cpu_s)
+    for _, case in _surveys("stations", COARSE_STEP_DEG, SEEDS[:1]):
+        for stations in (4, 6, 7, 9):
+            found, _, cpu_s = registered(Survey(case.given[:stations], case.T_world_scan, case.checks_m))
+            pairs.append(len(found.pairs))
+            seconds.append(cpu_s)
     data = f"simulated bridge, {pairs[0]} to {pairs[-1]} overlapping pairs"
     yield row("growth of CPU time with pairs", _slope(pairs, seconds), "exponent", "≤ 1.15", data, "1")
 
 
-def _placed_blindly(case: Survey, source: str, target: str) -> Array | None:
-    """The coarse T_target_source of a pair of which nothing is known."""
+PARTS = {
+    "known-positions": known_positions,
+    "targets": targets,
+    "no-poses": no_poses,
+    "blind-pairs": blind_pairs,
+    "every-fault": every_fault,
+    "wrong-pose": wrong_pose,
+    "refusals": refusals,
+    "growth": growth,
+}
+
+
+def _surveys(
+    name: str, step_deg: float = STEP_DEG, seeds: Sequence[int] = SEEDS
+) -> Iterator[tuple[int, Survey]]:
+    """The nine-station bridge of each seed, its files gone when the next one comes."""
+    for seed in seeds:
+        with TemporaryDirectory(prefix=f"{name}-") as folder:
+            yield seed, survey(nine_station_bridge(seed), Scanning(step_deg=step_deg), Path(folder))
+
+
+def _bridge(seeds: str, step_deg: float = STEP_DEG) -> dict[str, Any]:
+    return {"data": f"simulated bridge, 9 stations, {step_deg}° steps", "seed": seeds}
+
+
+def _placed_blindly(case: Survey, pairs: Sequence[tuple[str, str]]) -> list[Array | None]:
+    """The coarse T_target_source of each pair (source, target), alone and of which nothing is known."""
     with TemporaryDirectory() as name:
         sites, _ = load_stations(case.given, SETTINGS, Shelf(Path(name)), lambda _: None)
         voxel_m = max(float(np.median([s.coarse_voxel_m for s in sites])), SETTINGS.tau_m)
         shapes = [shape(s, voxel_m) for s in sites]
-    T = place(sites, shapes, voxel_m, SETTINGS.min_overlap, lambda _: None)
     at = {s.name: k for k, s in enumerate(sites)}
-    if len(T) < 2:
-        return None
-    return np.asarray(inverse(T[at[target]]) @ T[at[source]])
+    found: list[Array | None] = []
+    for pair in pairs:
+        source, target = (at[name] for name in pair)
+        two = [target, source]
+        T = place(
+            [sites[k] for k in two], [shapes[k] for k in two], voxel_m, SETTINGS.min_overlap, lambda _: None
+        )
+        found.append(T[1] if len(T) == 2 else None)
+    return found
 
 
 def _right(T: Array | None, truth: Array) -> bool:

@@ -1,5 +1,7 @@
 """`make bench-scans`: registration and surfaces against the simulator's truth, beside other programs."""
 
+from collections.abc import Callable, Iterator
+from functools import partial
 from importlib.util import find_spec
 
 from tests.benchmarks import real_scan_rows, registration_rows, surface_rows
@@ -9,16 +11,22 @@ from tests.benchmarks.table import Row, absent, gather
 def other_peers() -> list[Row]:
     """Those that have no rows, and why."""
     rows = [absent("every row", "CloudComPy", "not on PyPI")]
-    rows.append(absent("planes", "cgal", "no row yet: its wheel holds CGAL_Shape_detection.efficient_RANSAC"))
-    if find_spec("kiss_matcher") is None:
-        rows.append(absent("coarse alignment", "KISS-Matcher", "not installed: pip install -e .[bench]"))
+    for what, peer, module in (
+        ("planes", "CGAL", "CGAL"),
+        ("coarse alignment", "KISS-Matcher", "kiss_matcher"),
+    ):
+        if find_spec(module) is None:
+            rows.append(absent(what, peer, "not installed: pip install -e .[bench]"))
     return rows
 
 
-PARTS = {
-    "registration": registration_rows.rows,
+PARTS: dict[str, Callable[[], Iterator[Row] | list[Row]]] = {
+    **registration_rows.PARTS,
     "real": real_scan_rows.rows,
-    "surfaces": surface_rows.rows,
+    **{name: partial(surface_rows.structure, name) for name in surface_rows.BARS},
+    **{f"{name}-faults": partial(surface_rows.faults, name) for name in surface_rows.BARS},
+    "surfaces-growth": surface_rows.growth,
+    "surface-names": surface_rows.names,
     "other-peers": other_peers,
 }
 

@@ -1,7 +1,7 @@
-"""Rows of `make bench-scans` on surfaces and obstacles: against truth, and beside Open3D on the same clouds.
+"""Rows of `make bench-scans` on surfaces and obstacles: against truth and other programs.
 
-Each seed has its own noise, trees, and stations moved by half a metre. What is scored is in surface_score.py.
-Open3D's planes get our outlines (their time is not counted), its planar patches their own boxes.
+Each seed has its own noise, trees, and stations moved by half a metre. What is scored is in surface_score.py,
+the peers are in surface_peers.py.
 """
 
 import time
@@ -11,12 +11,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import open3d as o3d
 
-from schemas.plane import Plane
 from schemas.scanning import Scanning
-from schemas.settings import SurfaceSettings
-from schemas.surface import Surface, in_plane_axes
+from schemas.surface import Surface
 from tasks.simulation.face import vector
 from tasks.simulation.scan_faults import every_fault
 from tasks.simulation.scene import Scene
@@ -24,10 +21,8 @@ from tasks.simulation.scenes import SCENES
 from tasks.surfaces.cloud import Cloud
 from tasks.surfaces.extraction import Extraction, extract_structure
 from tasks.surfaces.naming import middle_m
-from tasks.surfaces.patches import patches
-from tasks.surfaces.plane_fit import fit_plane
-from tasks.surfaces.voxels import voxelise
 from tests.benchmarks.merged_scans import MergedScans, merged_scans
+from tests.benchmarks.surface_peers import PEERS, SETTINGS, own_search_s
 from tests.benchmarks.surface_score import Truth, obstacles_found, score_surfaces
 from tests.benchmarks.table import Row, row
 
@@ -35,8 +30,6 @@ Floats = npt.NDArray[np.float64]
 SEEDS, NAME_SEEDS = range(1, 6), range(1, 11)
 PEER_SEEDS = range(1, 2)  # segment_plane takes minutes
 MOVED_M = 0.5
-SETTINGS = SurfaceSettings()
-PEER_PLANES, PEER_ITERATIONS, PEER_FEWEST = 80, 1000, 100
 THINGS = {
     "bridge": ("lamp", "car", "rail", "trunk", "leaf"),
     "arch": ("bench", "bollard", "sign", "rail", "trunk", "leaf"),
@@ -52,16 +45,6 @@ class Case:
     scene: Scene
     truth: Truth
     scans: MergedScans
-
-
-def rows() -> Iterator[Row]:
-    """All rows, as DESIGN.md's benchmarks have them."""
-    for name in SCENES:
-        if name in BARS:
-            yield from _structure(name)
-    yield from _faults()
-    yield from _growth()
-    yield from _names()
 
 
 def site(name: str, seed: int, moved_m: float = MOVED_M) -> Scene:
@@ -87,11 +70,11 @@ def _row(what: str, values: Sequence[float], unit: str, bar: str | None, data: s
     return row(what, float(np.median(values)), unit, bar, data, f"{len(values)} seeds", **peer)
 
 
-def _structure(name: str) -> Iterator[Row]:
+def structure(name: str) -> Iterator[Row]:
     recall, precision, normal, offset, seconds, coverage, deviation = ([] for _ in range(7))
     large, on_cables, kept_cables = 0, 0, 0
     found_large = 0
-    peers: dict[str, list[tuple[float, float, float]]] = {"segment_plane": [], "detect_planar_patches": []}
+    peers: dict[str, list[tuple[float, float, float, float]]] = {peer: [] for peer in PEERS}
     for seed in SEEDS:
         case = _case(name, seed, Scanning())
         extraction, cpu = _extracted(case.scans.cloud)
@@ -114,20 +97,18 @@ def _structure(name: str) -> Iterator[Row]:
             kept = obstacles_found(extraction.obstacles, (), points, cable)
             on_cables, kept_cables = on_cables + len(kept), kept_cables + sum(kept)
         if seed in PEER_SEEDS:
-            for peer, planes in (
-                ("segment_plane", segment_planes),
-                ("detect_planar_patches", planar_patches),
-            ):
+            cpu, search_s = _extracted(case.scans.cloud)[1], own_search_s(case.scans.cloud)  # compiled by now
+            for peer, planes in PEERS.items():
                 found_by_peer, peer_cpu = planes(case.scans.cloud)
                 peer_score = score_surfaces(found_by_peer, case.truth)
-                peers[peer].append((peer_score.recall, peer_score.precision, cpu / peer_cpu))
+                score_of = (peer_score.recall, peer_score.precision)
+                peers[peer].append((*score_of, search_s / peer_cpu, cpu / peer_cpu))
     data = f"simulated {name}, scanned from {len(case.scene.stations_m)} stations"
     for peer, scores in peers.items():
         theirs = np.median(np.array(scores), axis=0)
-        label = f"Open3D {peer}"
         bar = f"≥ {BARS[name]}"
         yield _row(
-            f"{name}: recall of surfaces", recall, "1", bar, data, peer=label, peer_value=round(theirs[0], 3)
+            f"{name}: recall of surfaces", recall, "1", bar, data, peer=peer, peer_value=round(theirs[0], 3)
         )
         yield _row(
             f"{name}: precision of surfaces",
@@ -135,14 +116,17 @@ def _structure(name: str) -> Iterator[Row]:
             "1",
             bar,
             data,
-            peer=label,
+            peer=peer,
             peer_value=round(theirs[1], 3),
         )
-        eighth = "≤ 0.125" if name == "bridge" and peer == "segment_plane" else None
-        ratios = [ratio for _, _, ratio in scores]
-        yield _row(
-            f"{name}: CPU time, ratio to the peer's", ratios, "1", eighth, data, peer=label, peer_value=1.0
-        )
+        eighth = "≤ 0.125" if name == "bridge" and peer == "Open3D segment_plane" else None
+        for column, what, limit in (
+            (2, "CPU time of the search for planes", eighth),
+            (3, "CPU time with noise filter, outlines, names and obstacles", None),
+        ):
+            ratios = [of_seed[column] for of_seed in scores]
+            text = f"{name}: {what}, to the peer's search"
+            yield _row(text, ratios, "1", limit, data, peer=peer, peer_value=1.0)
     limits = ("≤ 0.1", "≤ 3") if name == "bridge" else (None, None)
     yield _row(f"{name}: normals, 95th percentile", normal, "°", limits[0], data)
     yield _row(f"{name}: offsets, 95th percentile", offset, "mm", limits[1], data)
@@ -160,20 +144,17 @@ def _structure(name: str) -> Iterator[Row]:
         )
 
 
-def _faults() -> Iterator[Row]:
-    for name, bar in BARS.items():
-        scores = []
-        for seed in SEEDS:
-            case = _case(name, seed, every_fault(seed))
-            scores.append(score_surfaces(_extracted(case.scans.cloud)[0].surfaces, case.truth))
-        data = f"simulated {name}, every fault of the scanner on"
-        yield _row(f"{name}, faults: recall of surfaces", [s.recall for s in scores], "1", f"≥ {bar}", data)
-        yield _row(
-            f"{name}, faults: precision of surfaces", [s.precision for s in scores], "1", f"≥ {bar}", data
-        )
+def faults(name: str) -> Iterator[Row]:
+    scores = []
+    for seed in SEEDS:
+        case = _case(name, seed, every_fault(seed))
+        scores.append(score_surfaces(_extracted(case.scans.cloud)[0].surfaces, case.truth))
+    bar, data = f"≥ {BARS[name]}", f"simulated {name}, every fault of the scanner on"
+    yield _row(f"{name}, faults: recall of surfaces", [s.recall for s in scores], "1", bar, data)
+    yield _row(f"{name}, faults: precision of surfaces", [s.precision for s in scores], "1", bar, data)
 
 
-def _growth() -> Iterator[Row]:
+def growth() -> Iterator[Row]:
     """CPU time over points: as the site grows (bridges in a row), and as it is scanned more finely."""
     bridge = merged_scans(site("bridge", 1), Scanning(step_deg=0.72)).cloud
     side_m = float(np.ptp(bridge.points[:, 0])) + 5.0
@@ -197,7 +178,7 @@ def _growth() -> Iterator[Row]:
         }
 
 
-def _names() -> Iterator[Row]:
+def names() -> Iterator[Row]:
     """How many surfaces bear the same name in other scans of the bridge."""
     runs = [
         _extracted(merged_scans(site("bridge", seed, 0.0), Scanning()).cloud)[0].surfaces
@@ -243,79 +224,3 @@ def _things(
         if len(own) >= 10 and np.ptp(scans.cloud.points[own], axis=0).max() >= smallest_m:
             found.append(own)
     return found
-
-
-def _without_ground(found: Sequence[Surface]) -> tuple[Surface, ...]:
-    """Peers do not say what is ground; every scene's lies at 0, ± its relief."""
-    return tuple(s for s in found if not (s.plane.normal[2] > 0.9 and middle_m(s)[2] < 0.25))
-
-
-def segment_planes(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
-    """Open3D's segment_plane, again and again on what is left of the cloud at equal density; and its CPU
-    seconds."""
-    equal, _ = voxelise(cloud, SETTINGS.voxel_m or 0.05)
-    rest = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(equal.points))
-    index = np.arange(len(equal))
-    planes = []
-    o3d.utility.random.seed(0)
-    began = time.process_time()
-    while len(planes) < PEER_PLANES and len(index) > PEER_FEWEST:
-        _, inliers = rest.segment_plane(SETTINGS.distance_m, 3, PEER_ITERATIONS)
-        if len(inliers) < PEER_FEWEST:
-            break
-        planes.append(index[inliers])
-        index = np.delete(index, inliers)
-        rest = rest.select_by_index(inliers, invert=True)
-    seconds = time.process_time() - began
-    found = []
-    for own in planes:
-        facing = fit_plane(equal.points[own], np.array([0.0, 0.0, 1.0]))[1]
-        for sign in (1.0, -1.0):
-            side = own[equal.views[own] @ (sign * facing) > 0]
-            found += patches(equal.points, side, sign * facing, 0.08, 0.35, SETTINGS.min_area_m2)
-    return _without_ground([patch.surface for patch in found]), seconds
-
-
-def planar_patches(cloud: Cloud) -> tuple[tuple[Surface, ...], float]:
-    """Open3D's detect_planar_patches with its documented settings, and its CPU seconds."""
-    equal, _ = voxelise(cloud, SETTINGS.voxel_m or 0.05)
-    whole = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(equal.points))
-    whole.normals = o3d.utility.Vector3dVector(equal.normals)
-    began = time.process_time()
-    boxes = whole.detect_planar_patches(
-        normal_variance_threshold_deg=60,
-        coplanarity_deg=75,
-        outlier_ratio=0.75,
-        min_plane_edge_length=0.0,
-        min_num_points=0,
-        search_param=o3d.geometry.KDTreeSearchParamKNN(knn=30),
-    )
-    seconds = time.process_time() - began
-    found = []
-    for box in boxes:
-        thin = int(np.argmin(box.extent))
-        wide = [k for k in range(3) if k != thin]
-        normal = np.asarray(box.R)[:, thin]
-        moved = (equal.points - box.center) @ np.asarray(box.R)
-        inside = (np.abs(moved) <= np.asarray(box.extent) / 2 + 0.02).all(axis=1)
-        if (equal.views[inside] @ normal).sum() < 0:
-            normal = -normal
-        u, v = in_plane_axes(normal)
-        sides = np.asarray(box.R)[:, wide] * (np.asarray(box.extent)[wide] / 2)
-        corners = [sides @ s for s in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        ring = tuple((float(c @ u), float(c @ v)) for c in corners)
-        area_m2 = float(np.prod(np.asarray(box.extent)[wide]))
-        if area_m2 >= SETTINGS.min_area_m2:
-            found.append(
-                Surface(
-                    name="patch",
-                    plane=Plane.through(box.center, normal),
-                    origin_m=vector(box.center),
-                    u=u,
-                    v=v,
-                    outline_m=ring,
-                    hull_m=ring,
-                    area_m2=area_m2,
-                )
-            )
-    return _without_ground(found), seconds

@@ -197,20 +197,33 @@ def test_real_street_pair_without_any_pose() -> None:
     assert np.linalg.norm(apart[:3, 3]) < 0.025
 
 
+T_ROOM1_ROOM2 = np.array(  # by small_gicp's GICP at 0.25 m, started from the right basin
+    [
+        [0.756390, -0.653931, 0.015757, 1.970261],
+        [0.653768, 0.756554, 0.014647, 0.061207],
+        [-0.021500, -0.000777, 0.999769, 0.034580],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+)
+
+
 def test_real_rooms_without_any_pose() -> None:
-    """Against small_gicp's GICP at 0.25 m (started from the right basin)."""
     folder = development_data("scans/rooms")
-    reference = np.array(
-        [
-            [0.756390, -0.653931, 0.015757, 1.970261],
-            [0.653768, 0.756554, 0.014647, 0.061207],
-            [-0.021500, -0.000777, 0.999769, 0.034580],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-    apart = inverse(reference) @ of_pair(folder, "room_scan1.pcd", "room_scan2.pcd")
+    apart = inverse(T_ROOM1_ROOM2) @ of_pair(folder, "room_scan1.pcd", "room_scan2.pcd")
     assert angle_deg(apart) < 0.35
     assert np.linalg.norm(apart[:3, 3]) < 0.02
+
+
+def test_real_rooms_with_a_tenth_of_their_points(tmp_path: Path) -> None:
+    """Sparser than τ."""
+    folder = development_data("scans/rooms")
+    rng = np.random.default_rng(3)
+    for k in (1, 2):
+        points_m = read_scan(folder / f"room_scan{k}.pcd").points_m
+        write_ply(tmp_path / f"{k}.ply", points_m[rng.random(len(points_m)) < 0.1])
+    apart = inverse(T_ROOM1_ROOM2) @ of_pair(tmp_path, "1.ply", "2.ply")
+    assert angle_deg(apart) < 1.0
+    assert np.linalg.norm(apart[:3, 3]) < 0.05
 
 
 def test_real_car_pair_without_any_pose() -> None:

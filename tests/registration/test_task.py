@@ -3,15 +3,20 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
+from laspy.vlrs.known import WktCoordinateSystemVlr
 
 from artifacts import store
 from schemas.problem import BadInput
-from schemas.settings import RegistrationSettings
+from schemas.settings import RegistrationSettings, SurfaceSettings
+from schemas.utm import utm_origin
 from tasks.registration.read_scan import read_scan
+from tasks.registration.rigid_motion import Array, transform, yaw
 from tasks.registration.task import ingest_scan, pages, register
-from tests.registration.site import measured_position
+from tasks.surfaces.task import extract
+from tests.registration.site import measured_position, pose_of
 
 
 @pytest.fixture(autouse=True)
@@ -59,3 +64,41 @@ def test_unusable_file_is_refused_by_its_name(tmp_path: Path) -> None:
     with pytest.raises(BadInput) as caught:
         ingest_scan.bare(store.current().put(path), "east bank", 1.0, None, None)
     assert caught.value.item == "east bank"
+
+
+def test_scans_in_utm_say_where_on_earth_the_model_lies(site_folder: Path, tmp_path: Path) -> None:
+    """Two LAS files in zone 32N, with half a metre between what their files say."""
+    scans = []
+    for k, off_m in ((0, 0.0), (3, 0.5)):
+        local = read_scan(site_folder / f"station{k}.ply").points_m
+        utm_m = transform(yaw(0.0, (512_300.0 + off_m, 5_402_100.0, 350.0)) @ pose_of(k), local)
+        scans += ingest_scan.bare(
+            store.current().put(_las(tmp_path / f"{k}.las", utm_m, "WGS 84 / UTM zone 32N")),
+            str(k),
+            1.0,
+            None,
+            None,
+        )
+    assert [scan.utm_zone for scan in scans] == ["32N", "32N"]
+    model = register.bare(tuple(scans), RegistrationSettings())
+    assert model.utm_zone == "32N"
+    assert model.origin_m == (512_300.0, 5_402_100.0, 0.0)
+    assert len(model.pairs) == 1
+    structure = extract.bare(model, SurfaceSettings())
+    origin = structure.geo_origin()
+    assert origin is not None
+    assert origin == utm_origin("32N", model.origin_m)
+    assert structure.geo_origin("31N") != origin
+    # in the datum of control targets, nobody knows the zone
+    here = model.model_copy(update={"utm_zone": None})
+    assert extract.bare(here, SurfaceSettings()).geo_origin() is None
+
+
+def _las(path: Path, points_m: Array, system: str) -> Path:
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.offsets, header.scales = points_m.min(axis=0), np.full(3, 1e-4)
+    header.vlrs.append(WktCoordinateSystemVlr(f'PROJCS["{system}",UNIT["metre",1]]'))
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = points_m.T
+    las.write(path)
+    return path

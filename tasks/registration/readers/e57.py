@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pye57
 
+from schemas.utm import zone_in
 from tasks.registration.readers.file_scan import BLOCK, FileScan, Unreadable, rigid_pose
 
 FIELDS = {
@@ -51,6 +52,15 @@ def read(path: Path, index: int) -> Iterator[FileScan]:
             if invalid in data:
                 points = points[data[invalid][:read] == 0]
             yield FileScan(points, None, pose, np.zeros(3))
+
+
+def stated_utm_zone(path: Path) -> str | None:
+    """Of the coordinate system that the file states as WKT; None where that is no UTM."""
+    with _opened(path) as e57:
+        root = e57.root
+        return (
+            zone_in(str(root["coordinateMetadata"].value())) if root.isDefined("coordinateMetadata") else None
+        )
 
 
 @contextmanager

@@ -9,10 +9,12 @@ from pathlib import Path
 import laspy
 import numpy as np
 
+from schemas.utm import zone_in, zone_of_epsg
 from tasks.registration.readers.file_scan import BLOCK, FileScan, Unreadable
 
 UNIT_OF_GEOKEY_M = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}  # EPSG: metre, foot, US survey foot
 LINEAR_UNITS_KEY = 3076  # GeoTIFF ProjLinearUnitsGeoKey
+PROJECTED_SYSTEM_KEY = 3072  # GeoTIFF ProjectedCSTypeGeoKey
 MOST_PACKED = 1000  # times; real points pack to a tenth
 
 
@@ -44,6 +46,19 @@ def stated_unit_m(path: Path) -> float | None:
         for key in getattr(record, "geo_keys", ()):
             if key.id == LINEAR_UNITS_KEY and key.value_offset in UNIT_OF_GEOKEY_M:
                 return UNIT_OF_GEOKEY_M[key.value_offset]
+    return None
+
+
+def stated_utm_zone(path: Path) -> str | None:
+    """Of its coordinate system; None where that is no UTM."""
+    with _opened(path) as las:
+        records = las.header.vlrs
+    for record in records:
+        if zone := zone_in(getattr(record, "string", "")):
+            return zone
+        for key in getattr(record, "geo_keys", ()):
+            if key.id == PROJECTED_SYSTEM_KEY and (zone := zone_of_epsg(key.value_offset)):
+                return zone
     return None
 
 
