@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from flows.command_line import app
+from flows.console import err
 from flows.plain_files import (
     OutFolder,
     one_by_one,
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from schemas.crack import Measurement
     from schemas.detection import Detection, Patterns
     from schemas.mosaic import Mosaic
+    from schemas.photo import Photo
     from schemas.settings import DetectSettings
 
 Method = Literal["hairline", "ridge", "paper", "global", "onnx"]
@@ -34,13 +36,13 @@ def stitch(
     Parameters
     ----------
     folder:
-        Photos: JPEG, PNG, TIFF. Focal length, GPS and gimbal angles are read from EXIF where present.
+        Photos: JPEG, PNG, TIFF, HEIC. Focal length, GPS and gimbal angles are read from EXIF where present.
     out:
         Folder to write to.
     gsd_mm_px:
         States the mosaic's scale, mm per pixel. Default: from GPS and altitude where the photos have them.
     camera:
-        YAML with width_px, height_px and focal_px, where EXIF lacks or errs.
+        YAML with width_px, height_px and focal_px, where EXIF lacks or errs; `hairline calibrate` writes one.
     """
     from artifacts import store
     from flows.results import write_mosaic
@@ -64,6 +66,23 @@ def stitch(
     counts = {s: sum(p.status == s for p in mosaic.placements) for s in ("solved", "placed", "rejected")}
     say(", ".join(f"{count} {status}" for status, count in counts.items()) + f": {out / 'mosaic.tif'}")
     warn([*left_out, *mosaic.left_out])
+    _warn_of_assumed(photos)
+
+
+def _warn_of_assumed(photos: "list[Photo]") -> None:
+    assumed = [photo.name for photo in photos if photo.camera_from.startswith("assumed")]
+    if assumed:
+        names = ", ".join(assumed[:5]) + (f" and {len(assumed) - 5} more" if len(assumed) > 5 else "")
+        text = (
+            f"Warning: no focal length is stated in {names}: 1.2 × the longer side is assumed, and adjusted"
+            " where photos are tilted. State it: a file with width_px, height_px and focal_px (or focal_mm"
+            " and sensor_width_mm) as --camera; hairline calibrate makes one from photos of a chessboard"
+        )
+        err.print(f"[yellow]{_escaped(text)}[/yellow]")
+
+
+def _escaped(text: str) -> str:
+    return text.replace("[", r"\[")
 
 
 @app.command
