@@ -20,6 +20,7 @@ from schemas.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from schemas.camera import Camera
+    from schemas.geodesy import GeoOrigin
     from schemas.structure import Structure
 
 Six = tuple[float, float, float, float, float, float]
@@ -39,6 +40,7 @@ def plan(
     radius_m: float | None = None,
     home_m: tuple[float, float, float] | None = None,
     origin: tuple[float, float, float] | None = None,
+    anchor: list[Six] | None = None,
     free: list[Six] | None = None,
     close_ups: Path | None = None,
     what_if: Annotated[bool, Parameter(negative=())] = False,
@@ -72,6 +74,9 @@ def plan(
         Take-off and landing place, east north up, metres. Default: a free place beside the structure.
     origin:
         Latitude, longitude (degrees) and altitude (metres) of the world's origin (WGS84).
+    anchor:
+        Instead of the origin, twice: a point of the model, x y z in metres, and its latitude, longitude
+        (degrees) and altitude (metres). The model may be turned from north.
     free:
         A box that you vouch for as free of obstacles though no scanner saw it: its low and high corner, east
         north up, metres. May be given several times.
@@ -104,7 +109,8 @@ def plan(
         return
     if surfaces is None or structure is None or out is None:
         raise BadInput("plan", "needs surfaces.json and --out", "Give both, or --what-if for a table alone")
-    _plan(surfaces, structure, out, lens, vehicle, settings, home_m, origin, close_ups)
+    where = _where(origin, anchor)
+    _plan(surfaces, structure, out, lens, vehicle, settings, home_m, where, close_ups)
 
 
 def _plan(
@@ -115,21 +121,16 @@ def _plan(
     vehicle: Vehicle,
     settings: PlanSettings,
     home_m: tuple[float, float, float] | None,
-    origin: tuple[float, float, float] | None,
+    origin: "GeoOrigin | None",
     close_ups: Path | None,
 ) -> None:
     from flows.collect_images import REHEARSAL_ORIGIN
     from flows.results import write_flight_plan
     from schemas.crack_report import CrackReport
-    from schemas.geodesy import GeoOrigin
     from tasks.planning.task import effort, plan_flight
 
     cracks = read_contract(close_ups, CrackReport).cracks if close_ups else ()
-    where = (
-        GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
-        if origin
-        else REHEARSAL_ORIGIN
-    )
+    where = origin or REHEARSAL_ORIGIN
     about = effort(structure, camera, vehicle, settings, cracks)
     gsd = settings.asked_gsd_mm_px
     kind = f"close-ups of {len(cracks)} cracks" if cracks else "photos"
@@ -147,8 +148,34 @@ def _plan(
     warn(planned.left_out)
     if origin is None:
         err.print(
-            "[yellow]Warning: no --origin: the mission lies at ArduPilot's simulator, not at yours[/yellow]"
+            "[yellow]Warning: no --origin or --anchor: the mission lies at ArduPilot's simulator, not at"
+            " yours[/yellow]"
         )
+
+
+def _where(origin: tuple[float, float, float] | None, anchors: list[Six] | None) -> "GeoOrigin | None":
+    from schemas.geodesy import GeoOrigin, KnownPoint, anchored
+
+    if origin and anchors:
+        raise BadInput("--anchor", "an origin is given too", "Give the one or the other")
+    try:
+        if anchors:
+            found = anchored(
+                [
+                    KnownPoint(model_m=a[:3], latitude_deg=a[3], longitude_deg=a[4], altitude_m=a[5])
+                    for a in anchors
+                ]
+            )
+            say(
+                f"Origin {found.latitude_deg:.7f}°, {found.longitude_deg:.7f}°, model turned"
+                f" {found.heading_deg:.2f}° from north; {found.residual_m:.2f} m left at the known points"
+            )
+            return found
+        if origin:
+            return GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
+    except ValidationError as problem:
+        raise explain("--anchor" if anchors else "--origin", problem) from None
+    return None
 
 
 def _what_if(
