@@ -2,6 +2,7 @@
 be instead when its position errs."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,6 +26,7 @@ SAMPLES_ACROSS = 12  # a photo's shorter side
 GSD_TOLERANCE = 1.02  # a pixel this much larger than asked still counts: rounding of angles and places
 BIAS_S = 120.0  # memory of the slow part of the position error, which walks over minutes
 DRAWS = 200
+THREADS = 2
 TENTHS_OF_PERCENT = 1000.0
 
 
@@ -108,16 +110,21 @@ def seen_off_course(
     samples: Samples,
 ) -> tuple[Indices, ...]:
     """Of each photo what it shows, as `seen_by` judges it, from each of the places `AROUND` the planned one,
-    off by the position error's bound: numbers of samples, plus their count times the place's number."""
+    off by the position error's bound: numbers of samples, plus their count times the place's number.
+
+    A place off along the surface, or not at all, may be farther back too, up to the error's bound in 3D:
+    pixels are judged there. The other places are nearer to the surface, or that far back already."""
     sigma = float(np.hypot(vehicle.position_bias_m, vehicle.position_jitter_m))
     table = view_table(surface, camera, poses, samples.points_m, scene, sigma)
     reach = off_course_m(surface, vehicle)
+    back = np.sqrt(np.maximum(vehicle.position_error_m**2 - (reach**2).sum(axis=1), 0.0))
+    back[AROUND[:, 2] != 0] = 0.0
     well = np.zeros(table.visible.shape, dtype=bool)
     for place, offset in enumerate(reach):
         _shows(
             table.eyes_m + offset, table.R_world_camera, table.first, table.samples, table.visible[place],
             samples.points_m, np.asarray(surface.plane.normal), *_optics(camera),
-            gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9, well[place],
+            gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9, back[place], well[place],
         )  # fmt: skip
     numbers = table.samples + len(samples.uv_m) * np.arange(len(reach))[:, None]
     return tuple(numbers[:, a:b][well[:, a:b]] for a, b in pairwise(table.first))
@@ -154,8 +161,8 @@ def drawn(
     lacks = np.zeros((draws, len(samples.uv_m)), dtype=bool)
     optics = _optics(camera)
     tenths = np.full((draws, len(samples.uv_m)), np.iinfo(np.uint16).max, dtype=np.uint16)
-    for draw in range(draws):
-        offsets = position_errors(times_s, vehicle, rng)
+
+    def fly(draw: int, offsets: Array) -> None:
         nearest = ((offsets[:, None] - table.around_m) ** 2).sum(axis=2).argmin(axis=1)
         photos, best = _photos_of(
             table.eyes_m + offsets, nearest, table.R_world_camera, table.first, table.samples, table.visible,
@@ -166,6 +173,10 @@ def drawn(
             once[draw], twice[draw] = (photos[reachable] >= 1).mean(), (photos[reachable] >= 2).mean()
         lacks[draw] = photos < 2
         tenths[draw] = np.minimum(best / gsd_mm_px * TENTHS_OF_PERCENT, np.iinfo(np.uint16).max)
+
+    errors = [position_errors(times_s, vehicle, rng) for _ in range(draws)]
+    with ThreadPoolExecutor(THREADS) as threads:  # the kernels leave Python's lock
+        list(threads.map(fly, range(draws), errors))
     most = np.partition(tenths, int(np.ceil(0.95 * draws)) - 1, axis=0)[int(np.ceil(0.95 * draws)) - 1]
     mm_px = np.where(most < np.iinfo(np.uint16).max, most * gsd_mm_px / TENTHS_OF_PERCENT, np.inf)
     worst = np.argsort(twice, kind="stable")[: max(1, draws // 10)]
@@ -285,16 +296,21 @@ def _count(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _shows(  # type: ignore[no-untyped-def]
-    eyes, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos, well
+    eyes, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos, back_m, well
 ):
     for p in range(len(eyes)):
         for k in range(first[p], first[p + 1]):
             if visible[k]:
-                inside, cos, size = _view(points[samples[k]], eyes[p], turns[p], normal, optics, widest)
-                well[k] = inside and cos >= least_cos and size <= gsd
+                point, eye = points[samples[k]], eyes[p]
+                inside, cos, size = _view(point, eye, turns[p], normal, optics, widest)
+                if inside and cos >= least_cos:
+                    away = np.sqrt(
+                        (point[0] - eye[0]) ** 2 + (point[1] - eye[1]) ** 2 + (point[2] - eye[2]) ** 2
+                    )
+                    well[k] = size * (1 + back_m / away) <= gsd
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _photos_of(  # type: ignore[no-untyped-def]
     eyes, places, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos
 ):
