@@ -81,7 +81,7 @@ def _placemark(folder: Element, plan: FlightPlan, index: int, waypoint: Waypoint
     else:
         _put(placemark, useGlobalHeight=0, ellipsoidHeight=height, height=height)
     _put(placemark, waypointSpeed=plan.vehicle.speed_m_s)
-    heading = _heading_deg(waypoint.yaw_deg)
+    heading = _heading_deg(plan.origin.compass_deg(waypoint.yaw_deg))
     _group(
         placemark,
         "waypointHeadingParam",

@@ -11,6 +11,7 @@ COLUMNS = (
     *("waypoint", "kind", "latitude_deg", "longitude_deg", "height_above_home_m"),
     *("east_m", "north_m", "up_m", "yaw_deg", "pitch_deg", "surface", "photo"),
 )
+# yaw_deg is clockwise from north; east_m and north_m lie along the axes of the plan's own frame.
 GAZE_M = 1.0  # of the line drawn along each view
 
 
@@ -26,7 +27,8 @@ def write_kml(plan: FlightPlan, path: Path) -> None:
         x, y, z = (float(a + b) for a, b in zip(waypoint.position_m, gaze, strict=True))
         placemark = SubElement(document, "Placemark")
         SubElement(placemark, "name").text = waypoint.photo
-        look = f"yaw {waypoint.yaw_deg:.1f}°, pitch {waypoint.pitch_deg:.1f}°, {waypoint.surface}"
+        yaw_deg = plan.origin.compass_deg(waypoint.yaw_deg)
+        look = f"yaw {yaw_deg:.1f}°, pitch {waypoint.pitch_deg:.1f}°, {waypoint.surface}"
         SubElement(placemark, "description").text = look
         both = SubElement(placemark, "MultiGeometry")
         point = SubElement(both, "Point")
@@ -62,5 +64,5 @@ def write_csv(plan: FlightPlan, path: Path) -> None:
             latitude, longitude, _ = plan.origin.to_geographic(w.position_m)
             place = [f"{latitude:.9f}", f"{longitude:.9f}", f"{w.position_m[2] - plan.home_m[2]:.3f}"]
             local = [f"{x:.4f}" for x in w.position_m]
-            angles = [f"{w.yaw_deg:.2f}", f"{w.pitch_deg:.2f}"]
+            angles = [f"{plan.origin.compass_deg(w.yaw_deg):.2f}", f"{w.pitch_deg:.2f}"]
             table.writerow([number, w.kind, *place, *local, *angles, w.surface or "", w.photo or ""])

@@ -7,7 +7,7 @@ from pathlib import Path
 from prefect import flow
 
 from artifacts import store
-from flows.external_flight import photos_and_log
+from flows.external_flight import photos_and_logs
 from flows.inspection_file import existing
 from flows.model_structure import has_scans, model
 from flows.opening import opened
@@ -16,7 +16,7 @@ from schemas.camera import Camera, CameraPose
 from schemas.file import File
 from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
-from schemas.geodesy import GeoOrigin
+from schemas.geodesy import GeoOrigin, anchored
 from schemas.inspection import Inspection, PhotoSet, SimulationInput
 from schemas.problem import BadInput, LeftOut
 from schemas.structure import Structure
@@ -70,10 +70,19 @@ def plan(inspection: Inspection, structure: Structure) -> FlightPlan:
         structure,
         inspection.camera.camera(),
         inspection.vehicle,
-        inspection.origin or structure.geo_origin(inspection.utm_zone) or REHEARSAL_ORIGIN,
+        where_it_lies(inspection, structure),
         inspection.home_m,
         inspection.plan,
     )
+
+
+def where_it_lies(inspection: Inspection, structure: Structure) -> GeoOrigin:
+    """The origin: stated, from known points, from the scans' map grid, or else that of a rehearsal."""
+    if inspection.anchors and inspection.origin is not None:
+        raise BadInput("anchors", "the inspection has an origin too", "Give the one or the other")
+    if inspection.anchors:
+        return anchored(inspection.anchors)
+    return inspection.origin or structure.geo_origin(inspection.utm_zone) or REHEARSAL_ORIGIN
 
 
 def collect(
@@ -94,9 +103,10 @@ def collect(
     if inspection.flight is None or planned is None:
         return Collected(planned, photos=tuple(_given_photos(inspection, base, None)), surfaces=surfaces)
     if inspection.flight == "external":
-        photo_sets, log_path = photos_and_log(inspection, base)
+        photo_sets, paths = photos_and_logs(inspection, base)
         inspection = inspection.model_copy(update={"photos": photo_sets})
-        log = import_log(store.current().put(log_path), log_path.name, planned)
+        log = joined([import_log(store.current().put(path), path.name, planned) for path in paths])
+        log = log.model_copy(update={"missed": _not_shot(planned, log)})
     else:
         log = _flown(inspection, planned)
     simulated = inspection.simulation is not None and inspection.flight == "simulated"
@@ -130,6 +140,12 @@ def _flown(inspection: Inspection, planned: FlightPlan) -> FlightLog:
 def _mission(inspection: Inspection, number: int) -> str:
     """The id that a flight of the plan is flown once under."""
     return inspection.mission if number == 0 else f"{inspection.mission} flight {number + 1}"
+
+
+def _not_shot(planned: FlightPlan, log: FlightLog) -> tuple[str, ...]:
+    """Also of flights that were not flown, or whose log is not there."""
+    shot = {shot.photo for shot in log.shots}
+    return tuple(w.photo for w in planned.shooting_points if w.photo is not None and w.photo not in shot)
 
 
 def _missed(log: FlightLog) -> tuple[LeftOut, ...]:

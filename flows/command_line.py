@@ -50,7 +50,7 @@ def run(
     redo: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
     dry_run: Annotated[bool, Parameter(negative="")] = False,
     photos: Path | None = None,
-    log: Path | None = None,
+    log: Annotated[tuple[Path, ...], Parameter(consume_multiple=True)] = (),
 ) -> int:
     """Run an inspection: every stage that its inputs allow, finished ones from the cache.
 
@@ -69,7 +69,7 @@ def run(
     photos:
         Folder of an external flight's photos.
     log:
-        Log of an external flight (tlog, BIN, ulg, mcap).
+        Log of an external flight (tlog, BIN, ulg, mcap); of several flights all of them, or their folder.
     """
     from flows.running import dry_run as only_look
     from flows.running import run_inspection

@@ -13,6 +13,8 @@ from schemas.problem import BadInput
 from tasks import run
 from tasks.stage import NotYetKnown
 
+LOG_SUFFIXES = {".tlog", ".bin", ".ulg", ".mcap"}
+
 
 class WaitingForFlight(Exception):
     """Nothing more can be done before the flight is flown."""
@@ -22,13 +24,15 @@ class ExternalFlight(RunInput):
     """The form that a deployed run shows in the dashboard."""
 
     photos: str  # folder of the flight's photos, on the machine that runs the inspection
-    log: str  # the flight's log: tlog, BIN, ulg or mcap
+    log: str  # the flight's log: tlog, BIN, ulg or mcap; of several flights their folder
 
 
-def photos_and_log(inspection: Inspection, base: Path) -> tuple[tuple[PhotoSet, ...], Path]:
-    """The photos and the log of an external flight: from the inspection, else asked for."""
-    if inspection.photos and inspection.flight_log is not None:
-        return inspection.photos, existing(base, inspection.flight_log, "flight_log")
+def photos_and_logs(inspection: Inspection, base: Path) -> tuple[tuple[PhotoSet, ...], list[Path]]:
+    """The photos and the logs of external flights: from the inspection, else asked for."""
+    if inspection.photos and inspection.flight_log:
+        named = inspection.flight_log
+        named = (named,) if isinstance(named, str) else named
+        return inspection.photos, [log for name in named for log in _logs(base, name, "flight_log")]
     if run.current().dry:
         raise NotYetKnown("fly")
     context = FlowRunContext.get()
@@ -37,7 +41,18 @@ def photos_and_log(inspection: Inspection, base: Path) -> tuple[tuple[PhotoSet, 
     return _asked_for(base)
 
 
-def _asked_for(base: Path) -> tuple[tuple[PhotoSet, ...], Path]:
+def _logs(base: Path, name: str, key: str) -> list[Path]:
+    """The log of that name, or those in the folder of that name."""
+    path = existing(base, name, key)
+    if not path.is_dir():
+        return [path]
+    logs = sorted(p for p in path.iterdir() if p.suffix.lower() in LOG_SUFFIXES)
+    if not logs:
+        raise BadInput(name, "holds no log", f"Put {', '.join(sorted(LOG_SUFFIXES))} files there")
+    return logs
+
+
+def _asked_for(base: Path) -> tuple[tuple[PhotoSet, ...], list[Path]]:
     """Suspend until the form is filled in; ask again, with the reason, while the answer is bad.
 
     Each question has its own key, since Prefect replays the answers already given when the run resumes."""
@@ -50,10 +65,7 @@ def _asked_for(base: Path) -> tuple[tuple[PhotoSet, ...], Path]:
                 timeout=30 * 24 * 3600,
             )
             existing(base, answer.photos, "photos")
-            log = existing(base, answer.log, "log")
-            if not log.is_file():
-                raise BadInput(answer.log, "is no file", "Name the log file itself")
-            return (PhotoSet(folder=answer.photos),), log
+            return (PhotoSet(folder=answer.photos),), _logs(base, answer.log, "log")
         except BadInput as problem:
             reason = f"**That did not work.** {problem}"
         except ValidationError:  # the server takes a form that lacks an answer

@@ -98,7 +98,8 @@ def _photo_lines(folder: Path, photo_folders: list[Path]) -> list[str]:
 def _flight_lines(folder: Path, scans: list[Path], logs: list[Path]) -> list[str]:
     lines = []
     if logs:
-        lines += ["", f"flight_log: {_quoted(folder, logs[0])}"]
+        named = [_quoted(folder, log) for log in logs]
+        lines += ["", f"flight_log: {named[0] if len(named) == 1 else '[' + ', '.join(named) + ']'}"]
     if logs and scans:
         lines += ["flight: external  # flown by somebody else from the plan's mission files"]
     return [
@@ -109,4 +110,7 @@ def _flight_lines(folder: Path, scans: list[Path], logs: list[Path]) -> list[str
         "#   {width_px: 8192, height_px: 5460, focal_mm: 35, sensor_width_mm: 35.9}",
         "# origin: {latitude_deg: 47.0, longitude_deg: 8.0, altitude_m: 400}  # WGS84 of (0, 0, 0)",
         "# utm_zone: 32N  # instead of origin, for scans in UTM whose files do not state it",
+        "# anchors:  # or two points of the model whose place on the Earth is known, far from each other",
+        "#   - {model_m: [0, 0, 0], latitude_deg: 47.0, longitude_deg: 8.0, altitude_m: 400}",
+        "#   - {model_m: [85.2, 3.1, 0], latitude_deg: 47.0001, longitude_deg: 8.0011}",
     ]

@@ -1,5 +1,6 @@
 """From raw scans and photos to a crack report: the whole of the paper, and the report it leaves to do."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from prefect import flow
@@ -22,13 +23,13 @@ def inspect_bridge(
     out: str | None = None,
     redo: tuple[str, ...] = (),
     photos: str | None = None,
-    log: str | None = None,
+    logs: tuple[str, ...] = (),
 ) -> CrackReport | None:
     """inspection: path of the YAML file (or demo:bridge, demo:wall); out: the run's folder; redo: stages to
-    run again; photos, log: of an external flight. Without photos it ends with the plan, and gives None."""
+    run again; photos, logs: of an external flight. Without photos it ends with the plan, and gives None."""
     with opened(inspection, out, redo) as run:
-        if photos is not None or log is not None:
-            run = with_flight(run, photos, log)
+        if photos is not None or logs:
+            run = with_flight(run, photos, logs)
         return inspect(run)
 
 
@@ -92,11 +93,11 @@ def _meant_to_be_inspected(collected: Collected) -> tuple[Surface, ...]:
     return tuple(surface for surface in collected.surfaces if surface.name in names)
 
 
-def with_flight(run: OpenRun, photos: str | None, log: str | None) -> OpenRun:
-    """The run of an external flight that is now flown: its photos and log, as paths from here."""
+def with_flight(run: OpenRun, photos: str | None, logs: Sequence[str]) -> OpenRun:
+    """The run of an external flight that is now flown: its photos and logs, as paths from here."""
     update: dict[str, object] = {}
     if photos is not None:
         update["photos"] = (PhotoSet(folder=str(Path(photos).resolve())),)
-    if log is not None:
-        update["flight_log"] = str(Path(log).resolve())
+    if logs:
+        update["flight_log"] = tuple(str(Path(log).resolve()) for log in logs)
     return OpenRun(run.inspection.model_copy(update=update), run.base, run.folder)

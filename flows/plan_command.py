@@ -21,6 +21,7 @@ from schemas.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from schemas.camera import Camera
+    from schemas.geodesy import GeoOrigin
     from schemas.structure import Structure
 
 Six = tuple[float, float, float, float, float, float]
@@ -41,6 +42,7 @@ def plan(
     home_m: tuple[float, float, float] | None = None,
     origin: tuple[float, float, float] | None = None,
     utm_zone: str | None = None,
+    anchor: list[Six] | None = None,
     free: list[Six] | None = None,
     close_ups: Path | None = None,
     what_if: Annotated[bool, Parameter(negative=())] = False,
@@ -76,6 +78,9 @@ def plan(
         Latitude, longitude (degrees) and altitude (metres) of the world's origin (WGS84).
     utm_zone:
         Instead of the origin, for scans in UTM: 32N, 56S… Not needed where LAS, LAZ or E57 files state it.
+    anchor:
+        Instead of the origin, twice: a point of the model, x y z in metres, and its latitude, longitude
+        (degrees) and altitude (metres). The model may be turned from north.
     free:
         A box that you vouch for as free of obstacles though no scanner saw it: its low and high corner, east
         north up, metres. May be given several times.
@@ -108,7 +113,8 @@ def plan(
         return
     if surfaces is None or structure is None or out is None:
         raise BadInput("plan", "needs surfaces.json and --out", "Give both, or --what-if for a table alone")
-    _plan(surfaces, structure, out, lens, vehicle, settings, home_m, origin, utm_zone, close_ups)
+    where = _where(structure, origin, anchor, utm_zone)
+    _plan(surfaces, structure, out, lens, vehicle, settings, home_m, where, close_ups)
 
 
 def _plan(
@@ -119,22 +125,16 @@ def _plan(
     vehicle: Vehicle,
     settings: PlanSettings,
     home_m: tuple[float, float, float] | None,
-    origin: tuple[float, float, float] | None,
-    utm_zone: str | None,
+    origin: "GeoOrigin | None",
     close_ups: Path | None,
 ) -> None:
     from flows.collect_images import REHEARSAL_ORIGIN
     from flows.results import write_flight_plan
     from schemas.crack_report import CrackReport
-    from schemas.geodesy import GeoOrigin
     from tasks.planning.task import effort, plan_flight
 
     cracks = read_contract(close_ups, CrackReport).cracks if close_ups else ()
-    where = (
-        GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
-        if origin
-        else structure.geo_origin(utm_zone and TypeAdapter(UtmZone).validate_python(utm_zone))
-    )
+    where = origin or REHEARSAL_ORIGIN
     about = effort(structure, camera, vehicle, settings, cracks)
     gsd = settings.asked_gsd_mm_px
     kind = f"close-ups of {len(cracks)} cracks" if cracks else "photos"
@@ -144,19 +144,48 @@ def _plan(
     )
     with working(out):
         enter_beside(surfaces, "occupied.ply", structure.occupied.sha256)
-        planned = plan_flight.bare(
-            structure, camera, vehicle, where or REHEARSAL_ORIGIN, home_m, settings, cracks
-        )
+        planned = plan_flight.bare(structure, camera, vehicle, where, home_m, settings, cracks)
         write_flight_plan(out, planned, copy=True)
     photos, minutes = len(planned.shooting_points), planned.duration_s / 60
     many = f" in {len(planned.flights)} flights" if len(planned.flights) > 1 else ""
     say(f"{photos} photos, {planned.length_m:.0f} m, {minutes:.1f} min{many}: {out / 'plan.json'}")
     warn(planned.left_out)
-    if where is None:
+    if origin is None:
         err.print(
-            "[yellow]Warning: neither --origin nor --utm-zone: the mission lies at ArduPilot's simulator,"
+            "[yellow]Warning: no --origin, --anchor or --utm-zone: the mission lies at ArduPilot's simulator,"
             " not at yours[/yellow]"
         )
+
+
+def _where(
+    structure: "Structure",
+    origin: tuple[float, float, float] | None,
+    anchors: list[Six] | None,
+    utm_zone: str | None,
+) -> "GeoOrigin | None":
+    from schemas.geodesy import GeoOrigin, KnownPoint, anchored
+
+    if origin and anchors:
+        raise BadInput("--anchor", "an origin is given too", "Give the one or the other")
+    try:
+        if anchors:
+            found = anchored(
+                [
+                    KnownPoint(model_m=a[:3], latitude_deg=a[3], longitude_deg=a[4], altitude_m=a[5])
+                    for a in anchors
+                ]
+            )
+            say(
+                f"Origin {found.latitude_deg:.7f}°, {found.longitude_deg:.7f}°, model turned"
+                f" {found.heading_deg:.2f}° from north; {found.residual_m:.2f} m left at the known points"
+            )
+            return found
+        if origin:
+            return GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
+        return structure.geo_origin(utm_zone and TypeAdapter(UtmZone).validate_python(utm_zone))
+    except ValidationError as problem:
+        given = "--anchor" if anchors else "--origin" if origin else "--utm-zone"
+        raise explain(given, problem) from None
 
 
 def _what_if(

@@ -43,7 +43,7 @@ def run_flow(
     out: str | None,
     redo: tuple[str, ...] = (),
     photos: str | None = None,
-    log: str | None = None,
+    logs: tuple[str, ...] = (),
 ) -> CrackReport | None:
     """From the cache alone where every result is there, which takes no Prefect run; else as a flow run."""
     from flows.inspect_bridge import inspect_bridge
@@ -59,11 +59,11 @@ def run_flow(
 
     try:
         with run.running(run.Run(listener=all_cached, dry=True)):
-            report = inspect_bridge.fn(inspection, out, redo, photos, log)
+            report = inspect_bridge.fn(inspection, out, redo, photos, logs)
     except (NotAllCached, NotYetKnown):
         use_server_that_answers()
         with listening():
-            return inspect_bridge(inspection, out, redo, photos, log)
+            return inspect_bridge(inspection, out, redo, photos, logs)
     with StageLines() as lines:
         for event in events:
             lines(event)
@@ -71,7 +71,7 @@ def run_flow(
 
 
 def run_inspection(
-    inspection: str, folder: Path | None, redo: tuple[str, ...], photos: Path | None, log: Path | None
+    inspection: str, folder: Path | None, redo: tuple[str, ...], photos: Path | None, logs: tuple[Path, ...]
 ) -> int:
     from flows.external_flight import WaitingForFlight
     from flows.inspection_file import read_inspection
@@ -80,10 +80,10 @@ def run_inspection(
     where = folder or Path("runs") / name
     out.print(f"Inspecting {name}")
     try:
-        report = run_flow(inspection, _text(folder), redo, _text(photos), _text(log))
+        report = run_flow(inspection, _text(folder), redo, _text(photos), tuple(str(log) for log in logs))
     except WaitingForFlight:
         out.print(f"The plan is ready: {where / 'plan'}. Fly it, then:")
-        out.print(f"  hairline run {inspection} --photos DIR --log FILE")
+        out.print(f"  hairline run {inspection} --photos DIR --log FILE [FILE …]", markup=False)
         return 3
     say_results(report, where)
     return 0

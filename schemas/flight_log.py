@@ -43,12 +43,20 @@ class FlightLog(Contract):
 
 
 def joined(logs: Sequence[FlightLog]) -> FlightLog:
-    """The flights of one plan as one log, in their order; times go on from flight to flight."""
+    """The flights of one plan as one log, in their order; times go on from flight to flight. A photo that two
+    flights took is the first one's, unless only the other reported it; what any took is not missed."""
     if len(logs) == 1:
         return logs[0]
     starts_s = [sum(log.duration_s for log in logs[:k]) for k in range(len(logs))]
+    shots: dict[str, Shot] = {}
+    for start, log in zip(starts_s, logs, strict=True):
+        for shot in log.shots:
+            if shot.photo not in shots or (shot.reported and not shots[shot.photo].reported):
+                shots[shot.photo] = shot.model_copy(update={"time_s": round(start + shot.time_s, 3)})
+    files = [file for log in logs for file in (log.archive, *log.later_archives)]
+    archives = tuple({file.sha256: file for file in files}.values())
     return FlightLog(
-        archive=logs[0].archive,
+        archive=archives[0],
         vehicle=logs[0].vehicle,
         duration_s=round(sum(log.duration_s for log in logs), 3),
         track=tuple(
@@ -56,16 +64,12 @@ def joined(logs: Sequence[FlightLog]) -> FlightLog:
             for start, log in zip(starts_s, logs, strict=True)
             for point in log.track
         ),
-        shots=tuple(
-            shot.model_copy(update={"time_s": round(start + shot.time_s, 3)})
-            for start, log in zip(starts_s, logs, strict=True)
-            for shot in log.shots
-        ),
+        shots=tuple(sorted(shots.values(), key=lambda shot: shot.time_s)),
         errors=tuple(
             error.model_copy(update={"what": f"flight {number}: {error.what}"})
             for number, log in enumerate(logs, start=1)
             for error in log.errors
         ),
-        missed=tuple(photo for log in logs for photo in log.missed),
-        later_archives=tuple(log.archive for log in logs[1:]),
+        missed=tuple(dict.fromkeys(photo for log in logs for photo in log.missed if photo not in shots)),
+        later_archives=archives[1:],
     )

@@ -36,7 +36,7 @@ class SurfaceCoverage(Contract):
     gsd_mm_px: float
     photos: int
     not_reached: tuple[str, ...] = ()  # reasons, in words, for what is not covered
-    reachable: float = 1.0  # share of the area that any allowed place shows at the asked GSD and angle
+    reachable: float = 1.0  # share that allowed places show at that GSD and angle, wherever the position errs
     twice: float | None = None  # share of the reachable area in at least two photos, flown exactly as planned
     twice_median: float | None = None  # and over many flights whose positions err as the vehicle's do:
     twice_p05: float | None = None  # 95 of 100 flights show more than this

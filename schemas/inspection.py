@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from schemas.camera import Camera, check_lens
 from schemas.contract import Contract, Matrix4, Vector3
-from schemas.geodesy import GeoOrigin
+from schemas.geodesy import GeoOrigin, KnownPoint
 from schemas.scanning import Scanning
 from schemas.settings import (
     AssessSettings,
@@ -96,12 +96,13 @@ class Inspection(Contract):
     flight: Literal["simulated", "vehicle", "external"] | None = None  # None: no flight
     connection: str | None = None  # of `flight: vehicle`
     mission: str = "1"  # a new id flies again
-    flight_log: str | None = None  # of an external flight
+    flight_log: str | tuple[str, ...] | None = None  # of an external flight; a list: a log a battery
     photos: tuple[PhotoSet, ...] = ()
     camera: CameraInput | None = None
     vehicle: Vehicle = Vehicle()
     origin: GeoOrigin | None = None
     utm_zone: UtmZone | None = None  # of scans or targets in UTM, where no file states it; instead of origin
+    anchors: tuple[KnownPoint, ...] = ()  # instead: points {model_m, latitude_deg, longitude_deg, altitude_m}
     home_m: Vector3 | None = None  # None: a free place beside the structure
     registration: RegistrationSettings = RegistrationSettings()
     surfaces: SurfaceSettings = SurfaceSettings()

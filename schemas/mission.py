@@ -63,7 +63,7 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
         )
 
     def face(yaw_deg: float) -> None:
-        add(mavlink.MAV_CMD_CONDITION_YAW, param1=round(yaw_deg % 360.0, 2) % 360.0)
+        add(mavlink.MAV_CMD_CONDITION_YAW, param1=round(plan.origin.compass_deg(yaw_deg) % 360.0, 2) % 360.0)
 
     add(mavlink.MAV_CMD_NAV_WAYPOINT, plan.home_m)  # item 0 is home by ArduPilot's convention
     here, yaw_deg, pitch_deg = _above_home(plan), 0.0, 0.0

@@ -57,7 +57,7 @@ def utm_origin(zone: str, place_m: Vector3) -> GeoOrigin:
         latitude_deg=math.degrees(latitude),
         longitude_deg=middle_deg + math.degrees(math.atan2(math.sinh(y), math.cos(x))),
         altitude_m=up_m,
-        grid_north_deg=math.degrees(math.atan2(dy + dx * turn, dx - dy * turn)),
+        heading_deg=math.degrees(math.atan2(dy + dx * turn, dx - dy * turn)),
         grid_scale=CENTRAL_SCALE * _RADIUS_M / SEMI_MAJOR_M * math.sqrt(stretch),
     )
 

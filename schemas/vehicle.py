@@ -7,6 +7,7 @@ from pydantic import Field
 from schemas.contract import Contract
 
 BOUND_3D = 2.795  # 95 % quantile of the length of a normal 3D vector, σ = 1 along each axis
+BOUND_OF_AXES = 2.388  # and of its largest component
 
 
 class Vehicle(Contract):
@@ -30,8 +31,8 @@ class Vehicle(Contract):
 
     @property
     def sideways_error_m(self) -> float:
-        """95 % bound of the position error along any one axis: two σ of its slow and quick part together."""
-        return 2.0 * math.hypot(self.position_bias_m, self.position_jitter_m)
+        """95 % bound of the position error along the axis where it is largest, both parts together."""
+        return BOUND_OF_AXES * math.hypot(self.position_bias_m, self.position_jitter_m)
 
     @property
     def inflation_m(self) -> float:

@@ -210,7 +210,7 @@ class Flight:
         if self._recorder is not None:
             time_ns = round(self.reader.clock_s * 1000) * 1_000_000
             self._recorder.frame(time_ns, bytes(message.get_msgbuf()))
-            archive(self._recorder, time_ns, read, self.place.world_m)
+            archive(self._recorder, time_ns, read, self.place.world_pose)
 
 
 def _armed(ack: Any) -> bool:

@@ -36,3 +36,10 @@ class Place:
     def world_m(self, fix: Fix) -> Vector3:
         east, north, _ = self.origin.to_enu(fix.latitude_deg, fix.longitude_deg, 0.0)
         return (east, north, self.home_up_m + fix.height_m)
+
+    def yaw_deg(self, fix: Fix) -> float:
+        return self.origin.yaw_deg(fix.yaw_deg)
+
+    def world_pose(self, fix: Fix) -> tuple[Vector3, float]:
+        """Position and yaw."""
+        return self.world_m(fix), self.yaw_deg(fix)

@@ -62,4 +62,4 @@ def _archive_all(path: Path, recording: Recording, recorder: Recorder) -> None:
     events: list[tuple[float, Fix | Trigger]] = [(fix.time_s, fix) for fix in recording.fixes]
     events += [(trigger.fix.time_s, trigger) for trigger in recording.triggers]
     for time_s, read in sorted(events, key=lambda event: event[0]):
-        archive(recorder, round(time_s * 1e6) * 1000, read, place.world_m)
+        archive(recorder, round(time_s * 1e6) * 1000, read, place.world_pose)

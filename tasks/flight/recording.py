@@ -60,7 +60,10 @@ class Recorder(Protocol):
 
 
 def archive(
-    recorder: Recorder, time_ns: int, read: Fix | Trigger | None, position_m: Callable[[Fix], Vector3]
+    recorder: Recorder,
+    time_ns: int,
+    read: Fix | Trigger | None,
+    world_pose: Callable[[Fix], tuple[Vector3, float]],
 ) -> None:
     """Write what viewers draw: the vehicle's or, at a trigger, the camera's location and pose."""
     if read is None:
@@ -68,4 +71,4 @@ def archive(
     fix = read.fix if isinstance(read, Trigger) else read
     of, pitch = ("/camera", read.pitch_deg) if isinstance(read, Trigger) else ("", 0.0)
     recorder.location(time_ns, fix.latitude_deg, fix.longitude_deg, fix.altitude_m, of=of)
-    recorder.pose(time_ns, position_m(fix), fix.yaw_deg, pitch, of=of)
+    recorder.pose(time_ns, *world_pose(fix), pitch, of=of)

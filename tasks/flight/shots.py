@@ -122,6 +122,6 @@ def _shot(
         surface=surface,
         time_s=round(trigger.fix.time_s - start_s, 3),
         pose=CameraPose(
-            position_m=place.world_m(trigger.fix), yaw_deg=trigger.fix.yaw_deg, pitch_deg=pitch_deg
+            position_m=place.world_m(trigger.fix), yaw_deg=place.yaw_deg(trigger.fix), pitch_deg=pitch_deg
         ),
     )

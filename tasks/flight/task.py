@@ -8,7 +8,7 @@ from artifacts import store
 from artifacts.flight_log import MAVLINK, ORIGINAL, FlightArchive, about, messages
 from artifacts.page import Page
 from schemas.file import File
-from schemas.flight_log import FlightLog
+from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
 from schemas.mission import mission_items
 from schemas.problem import BadInput
@@ -72,7 +72,8 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
 
 @stage(pages=flight_pages)
 def import_log(log: File, name: str, plan: FlightPlan | None) -> FlightLog:
-    """Understand the log of an external flight (tlog, BIN, ulg, or an archived mcap)."""
+    """Understand the log of an external flight (tlog, BIN, ulg, or an archived mcap). Of a plan of several
+    flights it may be the log of any, or of more than one."""
     from tasks.flight.read_log import kind_of_log
 
     path = store.current().path(log)
@@ -125,17 +126,21 @@ def _read_archive(path: Path, name: str, folder: Path) -> "Recording":
 
 
 def _flight_log(recording: "Recording", archive: File, plan: FlightPlan | None, name: str) -> FlightLog:
-    from tasks.flight.track import compare_with_plan
+    from tasks.flight.battery_flights import compare_with_flights
 
-    found = compare_with_plan(recording, plan, name)
-    return FlightLog(
-        archive=archive,
-        vehicle=recording.vehicle,
-        duration_s=found.duration_s,
-        track=found.track,
-        shots=found.shots,
-        errors=found.errors,
-        missed=found.missed,
+    return joined(
+        [
+            FlightLog(
+                archive=archive,
+                vehicle=recording.vehicle,
+                duration_s=found.duration_s,
+                track=found.track,
+                shots=found.shots,
+                errors=found.errors,
+                missed=found.missed,
+            )
+            for found in compare_with_flights(recording, plan, name)
+        ]
     )
 
 

@@ -82,7 +82,7 @@ def read_frames(timed_frames: Iterator[tuple[int, bytes]], recorder: Recorder | 
         read = reader.read(message) if message is not None else None
         if recorder is not None and read is not None:
             place = place or Place.of_log(reader.recording)
-            archive(recorder, time_ns, read, place.world_m)
+            archive(recorder, time_ns, read, place.world_pose)
     return reader.close()
 
 

@@ -41,7 +41,7 @@ def compare_with_plan(recording: Recording, plan: FlightPlan | None, name: str) 
     time_s = np.array([fix.time_s - start for fix in fixes])
     at_m = np.array([place.world_m(fix) for fix in fixes])
     track = tuple(
-        TrackPoint(time_s=round(float(t), 3), position_m=_vector(p), yaw_deg=fix.yaw_deg)
+        TrackPoint(time_s=round(float(t), 3), position_m=_vector(p), yaw_deg=place.yaw_deg(fix))
         for t, p, fix in zip(time_s, at_m, fixes, strict=True)
     )
     duration = round(max(end - start, float(time_s[-1])), 3)

@@ -43,7 +43,11 @@ class Airspace:
 
     def distance_m(self, places_m: Array, up_to_m: float = np.inf) -> Array:
         """(M,) distance from (M, 3) places to the nearest scanned point; inf beyond `up_to_m`."""
-        return np.asarray(self._tree.query(places_m, distance_upper_bound=up_to_m)[0])
+        return np.asarray(
+            self._tree.query(
+                places_m, distance_upper_bound=up_to_m, workers=2 if len(places_m) > 5000 else 1
+            )[0]
+        )
 
     def blocks(self, places_m: Array) -> npt.NDArray[np.int64]:
         """(M,) `Block` of each of (M, 3) places."""

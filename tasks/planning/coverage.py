@@ -2,6 +2,7 @@
 be instead when its position errs."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,7 +15,7 @@ from schemas.camera import Camera, CameraPose
 from schemas.surface import Surface
 from schemas.vehicle import Vehicle
 from tasks.planning.sight import Scene, outline_of
-from tasks.planning.view_table import AROUND, FROM_SIGMA, view_table
+from tasks.planning.view_table import AROUND, view_table
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -25,6 +26,7 @@ SAMPLES_ACROSS = 12  # a photo's shorter side
 GSD_TOLERANCE = 1.02  # a pixel this much larger than asked still counts: rounding of angles and places
 BIAS_S = 120.0  # memory of the slow part of the position error, which walks over minutes
 DRAWS = 200
+THREADS = 2
 TENTHS_OF_PERCENT = 1000.0
 
 
@@ -97,6 +99,42 @@ def seen_by(
     return Seen(samples.uv_m, samples.cell_m, photos, hidden, oblique, coarse, best, shown)
 
 
+def seen_off_course(
+    surface: Surface,
+    camera: Camera,
+    poses: Sequence[CameraPose],
+    vehicle: Vehicle,
+    gsd_mm_px: float,
+    max_incidence_deg: float,
+    scene: Scene,
+    samples: Samples,
+) -> tuple[Indices, ...]:
+    """Of each photo what it shows, as `seen_by` judges it, from each of the places `AROUND` the planned one,
+    off by the position error's bound: numbers of samples, plus their count times the place's number.
+
+    A place off along the surface, or not at all, may be farther back too, up to the error's bound in 3D:
+    pixels are judged there. The other places are nearer to the surface, or that far back already."""
+    sigma = float(np.hypot(vehicle.position_bias_m, vehicle.position_jitter_m))
+    table = view_table(surface, camera, poses, samples.points_m, scene, sigma)
+    reach = off_course_m(surface, vehicle)
+    back = np.sqrt(np.maximum(vehicle.position_error_m**2 - (reach**2).sum(axis=1), 0.0))
+    back[AROUND[:, 2] != 0] = 0.0
+    well = np.zeros(table.visible.shape, dtype=bool)
+    for place, offset in enumerate(reach):
+        _shows(
+            table.eyes_m + offset, table.R_world_camera, table.first, table.samples, table.visible[place],
+            samples.points_m, np.asarray(surface.plane.normal), *_optics(camera),
+            gsd_mm_px * GSD_TOLERANCE, np.cos(np.radians(max_incidence_deg)) - 1e-9, back[place], well[place],
+        )  # fmt: skip
+    numbers = table.samples + len(samples.uv_m) * np.arange(len(reach))[:, None]
+    return tuple(numbers[:, a:b][well[:, a:b]] for a, b in pairwise(table.first))
+
+
+def off_course_m(surface: Surface, vehicle: Vehicle) -> Array:
+    """(7, 3) world: where a flight is off that errs along none or one of the surface's axes, by the bound."""
+    return np.asarray(AROUND @ surface.R_world_surface.T * vehicle.sideways_error_m)
+
+
 def drawn(
     surface: Surface,
     camera: Camera,
@@ -123,9 +161,9 @@ def drawn(
     lacks = np.zeros((draws, len(samples.uv_m)), dtype=bool)
     optics = _optics(camera)
     tenths = np.full((draws, len(samples.uv_m)), np.iinfo(np.uint16).max, dtype=np.uint16)
-    for draw in range(draws):
-        offsets = position_errors(times_s, vehicle, rng)
-        nearest = ((offsets[:, None] - AROUND * FROM_SIGMA * sigma) ** 2).sum(axis=2).argmin(axis=1)
+
+    def fly(draw: int, offsets: Array) -> None:
+        nearest = ((offsets[:, None] - table.around_m) ** 2).sum(axis=2).argmin(axis=1)
         photos, best = _photos_of(
             table.eyes_m + offsets, nearest, table.R_world_camera, table.first, table.samples, table.visible,
             samples.points_m, np.asarray(surface.plane.normal), *optics,
@@ -135,6 +173,10 @@ def drawn(
             once[draw], twice[draw] = (photos[reachable] >= 1).mean(), (photos[reachable] >= 2).mean()
         lacks[draw] = photos < 2
         tenths[draw] = np.minimum(best / gsd_mm_px * TENTHS_OF_PERCENT, np.iinfo(np.uint16).max)
+
+    errors = [position_errors(times_s, vehicle, rng) for _ in range(draws)]
+    with ThreadPoolExecutor(THREADS) as threads:  # the kernels leave Python's lock
+        list(threads.map(fly, range(draws), errors))
     most = np.partition(tenths, int(np.ceil(0.95 * draws)) - 1, axis=0)[int(np.ceil(0.95 * draws)) - 1]
     mm_px = np.where(most < np.iinfo(np.uint16).max, most * gsd_mm_px / TENTHS_OF_PERCENT, np.inf)
     worst = np.argsort(twice, kind="stable")[: max(1, draws // 10)]
@@ -145,20 +187,17 @@ def position_errors(times_s: Array, vehicle: Vehicle, rng: np.random.Generator) 
     """(P, 3) metres: a bias that walks (Ornstein-Uhlenbeck, exact between photos) and jitter."""
     steps = np.exp(-np.abs(np.diff(times_s)) / BIAS_S)
     noise = rng.standard_normal((len(times_s), 3))
-    bias = np.empty((len(times_s), 3))
-    for p in range(len(times_s)):
-        kept = steps[p - 1] if p else 0.0
-        bias[p] = kept * (bias[p - 1] if p else 0.0) + np.sqrt(1 - kept**2) * noise[p]
+    bias = _walk(steps, noise)
     jitter = rng.standard_normal((len(times_s), 3))
     return np.asarray(vehicle.position_bias_m * bias + vehicle.position_jitter_m * jitter)
 
 
-def reasons(seen: Seen, unreachable: Mapping[str, float]) -> tuple[str, ...]:
-    """Why parts of the surface are not seen, in words with their areas; empty where all of it is.
+def reasons(seen: Seen, unreachable: Mapping[str, float], reachable: Flags) -> tuple[str, ...]:
+    """Why parts of the surface are not surely seen, in words with their areas; empty where all of it is.
 
-    unreachable: m² by the reason why no place allows to see them; what else is missed is a photo's fault."""
+    unreachable: m² by the reason why no place shows them surely; what else is missed is a photo's fault."""
     told = [f"{area:.2f} m² {reason}" for reason, area in unreachable.items()]
-    missed = float((seen.photos == 0).sum()) * seen.cell_m**2 - sum(unreachable.values())
+    missed = float(((seen.photos == 0) & reachable).sum()) * seen.cell_m**2
     if missed > seen.cell_m**2 / 2:
         told.append(f"{missed:.2f} m² in no photo at the asked size of pixels and angle")
     return tuple(told)
@@ -202,6 +241,14 @@ def _radial(r2, k1, k2, k3, k4, fisheye):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _walk(kept, noise):  # type: ignore[no-untyped-def]
+    walk = noise.copy()
+    for p in range(1, len(noise)):
+        walk[p] = kept[p - 1] * walk[p - 1] + np.sqrt(1 - kept[p - 1] ** 2) * noise[p]
+    return walk
+
+
+@njit(cache=True)
 def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def]
     """Whether a photo's frame holds a point; the cosine of its incidence, and the ground sample distance
     (mm/px) along its worst direction.
@@ -214,9 +261,6 @@ def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def
         return False, 0.0, np.inf
     x = (R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) / z
     y = (R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz) / z
-    nx = R[0, 0] * normal[0] + R[1, 0] * normal[1] + R[2, 0] * normal[2]
-    ny = R[0, 1] * normal[0] + R[1, 1] * normal[1] + R[2, 1] * normal[2]
-    nz = R[0, 2] * normal[0] + R[1, 2] * normal[1] + R[2, 2] * normal[2]
     r2 = x * x + y * y
     if r2 > widest:
         return False, 0.0, np.inf
@@ -224,10 +268,14 @@ def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def
     radial, bend = _radial(r2, k1, k2, k3, k4, fisheye)
     column = f * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx + 0.5
     row = f * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy + 0.5
-    inside = 0 <= column <= width and 0 <= row <= height
+    if not (0 <= column <= width and 0 <= row <= height):
+        return False, 0.0, np.inf
+    nx = R[0, 0] * normal[0] + R[1, 0] * normal[1] + R[2, 0] * normal[2]
+    ny = R[0, 1] * normal[0] + R[1, 1] * normal[1] + R[2, 1] * normal[2]
+    nz = R[0, 2] * normal[0] + R[1, 2] * normal[1] + R[2, 2] * normal[2]
     towards = x * nx + y * ny + nz
     if towards >= -1e-9:
-        return inside, 0.0, np.inf
+        return True, 0.0, np.inf
     slope = -z / towards
     ax, ay, az = z + slope * nx * x, slope * nx * y, slope * nx
     bx, by, bz = slope * ny * x, z + slope * ny * y, slope * ny
@@ -238,7 +286,7 @@ def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def
         bx, by, bz = (bx - tx * y) / radial, (by - ty * y) / radial, (bz - tz * y) / radial
     aa, bb, ab = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, ax * bx + ay * by + az * bz
     largest = (aa + bb) / 2 + np.sqrt(((aa - bb) / 2) ** 2 + ab * ab)
-    return inside, -towards / np.sqrt(r2 + 1), np.sqrt(largest) * 1000 / f
+    return True, -towards / np.sqrt(r2 + 1), np.sqrt(largest) * 1000 / f
 
 
 @njit(cache=True)
@@ -266,6 +314,22 @@ def _count(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _shows(  # type: ignore[no-untyped-def]
+    eyes, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos, back_m, well
+):
+    for p in range(len(eyes)):
+        for k in range(first[p], first[p + 1]):
+            if visible[k]:
+                point, eye = points[samples[k]], eyes[p]
+                inside, cos, size = _view(point, eye, turns[p], normal, optics, widest)
+                if inside and cos >= least_cos:
+                    away = np.sqrt(
+                        (point[0] - eye[0]) ** 2 + (point[1] - eye[1]) ** 2 + (point[2] - eye[2]) ** 2
+                    )
+                    well[k] = size * (1 + back_m / away) <= gsd
+
+
+@njit(cache=True, nogil=True)
 def _photos_of(  # type: ignore[no-untyped-def]
     eyes, places, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos
 ):

@@ -91,7 +91,7 @@ def prove(
         stand_off_m=round(stand_off_m, 4),
         gsd_mm_px=round(camera.gsd_mm_px(stand_off_m), 5),
         photos=len(poses),
-        not_reached=reasons(seen, completed.unreachable_m2),
+        not_reached=reasons(seen, completed.unreachable_m2, reachable),
         reachable=round(float(reachable.mean()), 5),
         twice=round(float((seen.photos[reachable] >= 2).mean()), 5) if reachable.any() else 0.0,
         twice_median=round(float(np.median(flown.twice)), 5) if reachable.any() else 0.0,

@@ -33,6 +33,7 @@ def pages(inputs: Mapping[str, Any], made: FlightPlan) -> list[Page]:
         "### Flight plan",
         f"{len(made.shooting_points)} photos, {made.length_m:.0f} m, {made.duration_s / 60:.1f} min,"
         f" overlap {made.overlap:.0%}, {len(made.each_flight)} of a battery each.",
+        *(["", _anchored(made.origin), ""] if made.origin.residual_m is not None else []),
         "| surface | area m² | covered | can be reached | of it in two photos | in 95 of 100 flights"
         " | measurable mm | stand-off m | mm/px | photos | not reached |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
@@ -70,6 +71,13 @@ def pages(inputs: Mapping[str, Any], made: FlightPlan) -> list[Page]:
         for number, w in enumerate(made.waypoints, start=1)
     ]
     return [Page(key="plan", markdown="\n".join(lines)), Page(key="waypoints", table=rows)]
+
+
+def _anchored(origin: GeoOrigin) -> str:
+    return (
+        f"Anchored by known points: {origin.latitude_deg:.7f}°, {origin.longitude_deg:.7f}°, the model turned"
+        f" {origin.heading_deg:.2f}° from north; {origin.residual_m:.2f} m are left at the worst of them."
+    )
 
 
 @stage(pages=pages)

@@ -16,8 +16,9 @@ Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.int64]
 
 RAYS_AT_ONCE = 400_000
-AROUND = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])  # (7, 3) of the position error's σ · FROM_SIGMA
-FROM_SIGMA = 1.5
+# (7, 3): the planned place and one off along each axis of the surface's frame, either way.
+AROUND = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+FROM_SIGMA = 1.5  # of the position error: how far off what hides a sample is looked for
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class ViewTable:
 
     eyes_m: Array  # (P, 3)
     R_world_camera: Array  # (P, 3, 3)
+    around_m: Array  # (7, 3) world: the places that `visible` is known from, less the planned one
     first: Indices  # (P + 1,)
     samples: Indices  # (K,)
     visible: Flags  # (7, K)
@@ -51,7 +53,8 @@ def view_table(
     samples = np.concatenate([*found, np.empty(0, dtype=np.int64)])
     eyes = np.array([pose.position_m for pose in poses]).reshape(-1, 3)
     eye_of = np.repeat(np.arange(len(poses)), np.diff(first))
-    places = AROUND * FROM_SIGMA * sigma_m if sigma_m > 0 else AROUND[:1]
+    around = AROUND @ surface.R_world_surface.T * FROM_SIGMA * sigma_m
+    places = around if sigma_m > 0 else around[:1]
     visible = np.ones((len(AROUND), len(samples)), dtype=bool)
     for low in range(0, len(samples), RAYS_AT_ONCE):
         part = slice(low, low + RAYS_AT_ONCE)
@@ -60,7 +63,7 @@ def view_table(
     if len(places) == 1:
         visible[:] = visible[0]
     turns = np.array([pose.R_world_camera for pose in poses]).reshape(-1, 3, 3)
-    return ViewTable(eyes, turns, first, samples, visible)
+    return ViewTable(eyes, turns, around, first, samples, visible)
 
 
 def _near(tree: cKDTree, surface: Surface, pose: CameraPose, corner_rays: Array, stray_m: float) -> Indices:

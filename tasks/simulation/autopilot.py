@@ -13,7 +13,7 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from schemas.contract import Vector3
-from schemas.geodesy import GeoOrigin
+from schemas.geodesy import GeoOrigin, turned
 from schemas.mission import MissionItem
 from schemas.vehicle import Vehicle
 from tasks.simulation.trajectory import DO, NAVIGATION, STEP_S, Flown, fly_mission
@@ -274,7 +274,7 @@ class Autopilot:
                     alt_rel=at_m[2] - self.home_m[2],
                     roll=0.0,
                     pitch=0.0,
-                    yaw=yaw_deg,
+                    yaw=self.origin.compass_deg(yaw_deg),
                     foc_len=0.0,
                     flags=mavlink.CAMERA_FEEDBACK_PHOTO,
                 )
@@ -287,7 +287,9 @@ class Autopilot:
         latitude, longitude, altitude = self.origin.to_geographic(at_m)
         east, north, up = (at - home for at, home in zip(at_m, self.home_m, strict=True))
         ve, vn, vu = velocity_m_s
-        heading = yaw_deg % 360.0
+        east, north = turned(east, north, self.origin.heading_deg)
+        ve, vn = turned(ve, vn, self.origin.heading_deg)
+        heading = self.origin.compass_deg(yaw_deg) % 360.0
         self.send(
             self.mav.attitude_encode(clock, 0.0, 0.0, math.radians((heading + 180) % 360 - 180), 0, 0, 0)
         )

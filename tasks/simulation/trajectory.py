@@ -113,7 +113,7 @@ def fly_mission(
             if loop >= end:
                 break
             if command.command == mavlink.MAV_CMD_CONDITION_YAW:
-                done = yaw.turn(loop, _single(command.param1))
+                done = yaw.turn(loop, origin.yaw_deg(_single(command.param1)))
                 loop = max(loop, done - YAW_REACHED_DEG / vehicle.yaw_rate_deg_s)
             elif command.command == mavlink.MAV_CMD_DO_MOUNT_CONTROL:
                 pitch.turn(loop, _single(command.param1))

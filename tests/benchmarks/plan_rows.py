@@ -8,6 +8,7 @@ from schemas.camera import Camera
 from schemas.geodesy import GeoOrigin
 from schemas.settings import PlanSettings
 from schemas.vehicle import Vehicle
+from tasks.planning.completing import CLOSER
 from tasks.planning.plan import plan_and_prove
 from tests.benchmarks.planning_scenes import OPEN, Truth, girder_bridge, random_scene, simulated
 from tests.benchmarks.table import Row, cpu_s, row
@@ -38,36 +39,38 @@ def coverage() -> list[Row]:
     return rows
 
 
-def clearance() -> list[Row]:
-    """50 scenes of random boxes round two walls that meet in a corner, paths and axes tested on the boxes'
-    own triangles, which the planner never sees."""
+def clearance(seeds: range = range(50)) -> list[Row]:
+    """50 scenes of random boxes round two walls that meet in a corner of 90°, 70° or 50°, paths and axes
+    tested on the solids' own triangles, which the planner never sees. A photo that is planned closer, since
+    it shows more there, is judged at the share of the stand-off that it is planned at."""
     camera = Camera(width_px=1632, height_px=1224, focal_px=4000.0)
     vehicle = Vehicle(clearance_m=0.5, position_bias_m=0.1, position_jitter_m=0.03)
     kept = vehicle.radius_m + vehicle.clearance_m + vehicle.position_error_m
     settings = PlanSettings(gsd_mm_px=1.2, overlap=0.3, free_m=(OPEN,))
-    violations, nearest, off = 0, np.inf, []
-    for seed in range(50):
-        structure, points, boxes = random_scene(seed)
+    violations, nearest, off, closer = 0, np.inf, [], 0
+    for seed in seeds:
+        structure, points, solids = random_scene(seed, corner_deg=(90.0, 70.0, 50.0)[seed % 3])
         origin = GeoOrigin(latitude_deg=47.0, longitude_deg=8.0)
         made, _ = plan_and_prove(structure, points, camera, vehicle, origin, None, settings)
-        truth = Truth(boxes)
-        least = truth.least_distance_m(np.array([w.position_m for w in made.waypoints]))
+        least = Truth(solids).least_distance_m(np.array([w.position_m for w in made.waypoints]))
         nearest = min(nearest, least - kept)
         violations += least < kept - 0.005
-        farthest = {c.surface: c.stand_off_m for c in made.coverage}
+        planned_m = {c.surface: c.stand_off_m for c in made.coverage}
         for w in made.shooting_points:
             surface = next(s for s in structure.surfaces if s.name == w.surface)
-            forward = w.pose.R_world_camera[:, 2]
-            cosine = float(-forward @ np.array(surface.plane.normal))
+            cosine = float(-w.pose.R_world_camera[:, 2] @ np.array(surface.plane.normal))
             error = vehicle.position_error_m
-            asked = (farthest[surface.name] + error) * cosine - error
+            asked = (np.array(CLOSER) * planned_m[surface.name] + error) * cosine - error
             along = float(surface.plane.signed_distance_m(w.position_m)) / cosine
-            off.append(abs(along / asked - 1))
-    data = "50 scenes, two walls that meet in a corner among 8 boxes"
+            off.append(np.abs(along / asked - 1).min())
+            closer += int(np.abs(along / asked - 1).argmin() > 0)
+    of = f"{seeds.start}…{seeds.stop - 1}"
+    data = f"{len(seeds)} scenes, two walls that meet in a corner of 90°, 70° or 50° among 8 boxes"
     return [
-        row("scenes with a path closer than the inflation", violations, "1", "≤ 0", data, "0…49"),
-        row("least distance beyond the inflation", nearest, "m", None, data, "0…49"),
-        row("stand-off off, largest", 100 * max(off), "%", "≤ 5", data, "0…49"),
+        row("scenes with a path closer than the inflation", violations, "1", "≤ 0", data, of),
+        row("least distance beyond the inflation", nearest, "m", None, data, of),
+        row("stand-off off, largest", 100 * max(off), "%", "≤ 5", data, of),
+        row("photos planned closer than the stand-off", 100 * closer / len(off), "%", None, data, of),
     ]
 
 

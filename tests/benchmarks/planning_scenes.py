@@ -1,6 +1,7 @@
 """Structures that plans are measured on: a girder bridge of any length, walls among random obstacles, and the
 simulator's scenes as a perfect scan would give them."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -22,6 +23,7 @@ Array = npt.NDArray[np.float64]
 
 SPACING_M = 0.05  # of the occupied points, as the extraction leaves them
 GROUND_SPACING_M = 0.1
+CORNER = np.array([4.0, 0.0, 0.0])  # where the two walls of a random scene meet
 NO_FILE = File(sha256="0" * 64, size=0, suffix=".ply")
 
 
@@ -101,16 +103,34 @@ def _face_points(face: Any) -> Array:
     return np.asarray(face.to_world(np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)))
 
 
-class Truth:
-    """Boxes as triangles, and how near a path comes to them: Open3D's exact distance at every centimetre."""
+@dataclass(frozen=True)
+class Solid:
+    """A box, turned clockwise (seen from above) about where the two walls meet."""
 
-    def __init__(self, boxes: list[tuple[Array, Array]]) -> None:
+    low_m: Array
+    high_m: Array
+    turned_deg: float = 0.0
+
+    def turn(self, places_m: Array) -> Array:
+        c, s = np.cos(np.radians(self.turned_deg)), np.sin(np.radians(self.turned_deg))
+        about = places_m - CORNER
+        return np.asarray(np.column_stack([about[:, :2] @ [[c, -s], [s, c]], about[:, 2]]) + CORNER)
+
+
+class Truth:
+    """Solids as triangles, and how near a path comes to them: Open3D's exact distance at every centimetre."""
+
+    def __init__(self, solids: list[Solid]) -> None:
         import open3d as o3d
 
         self._scene = o3d.t.geometry.RaycastingScene()
-        for low, high in boxes:
-            mesh = o3d.t.geometry.TriangleMesh.create_box(*(float(x) for x in high - low))
-            self._scene.add_triangles(mesh.translate(low.astype(np.float32)))
+        for solid in solids:
+            mesh = o3d.geometry.TriangleMesh.create_box(*(float(x) for x in solid.high_m - solid.low_m))
+            corners = solid.turn(np.asarray(mesh.vertices) + solid.low_m)
+            self._scene.add_triangles(
+                o3d.core.Tensor(corners.astype(np.float32)),
+                o3d.core.Tensor(np.asarray(mesh.triangles).astype(np.uint32)),
+            )
 
     def least_distance_m(self, corners_m: Array) -> float:
         import open3d as o3d
@@ -123,25 +143,31 @@ class Truth:
         return float(self._scene.compute_distance(o3d.core.Tensor(places)).numpy().min())
 
 
-def random_scene(seed: int) -> tuple[Structure, Array, list[tuple[Array, Array]]]:
-    """Two walls that meet in an inner corner of 90°, 8 boxes around them, and all as boxes; the ground is not
-    among these, since the take-off touches it."""
+def random_scene(seed: int, corner_deg: float = 90.0) -> tuple[Structure, Array, list[Solid]]:
+    """Two walls that meet in an inner corner, 8 boxes around them, and all as solids; the ground is not among
+    these, since the take-off touches it."""
     rng = np.random.default_rng(seed)
-    boxes = [(np.array([-4.0, 0.0, 2.0]), np.array([4.0, 0.3, 5.0]))]
+    turned = 90.0 - corner_deg
+    solids = [
+        Solid(np.array([-4.0, 0.0, 2.0]), np.array([4.0, 0.3, 5.0])),
+        Solid(np.array([4.0, -8.0, 2.0]), np.array([4.3, 0.0, 5.0]), turned),
+    ]
+    middle = solids[1].turn(np.array([[4.0, -4.0, 3.5]]))[0]
+    normal = (-np.cos(np.radians(turned)), np.sin(np.radians(turned)), 0.0)
     surfaces = [
         rectangle("ground-01", (0.0, 0.0, 0.0), (0, 0, 1), 30.0, 30.0),
         rectangle("wall-01", (0.0, 0.0, 3.5), (0, -1, 0), 8.0, 3.0),
-        rectangle("wall-02", (4.0, -4.0, 3.5), (-1, 0, 0), 8.0, 3.0),
+        rectangle("wall-02", (float(middle[0]), float(middle[1]), 3.5), normal, 8.0, 3.0),
     ]
-    boxes.append((np.array([4.0, -8.0, 2.0]), np.array([4.3, 0.0, 5.0])))
-    while len(boxes) < 10:
+    while len(solids) < 10:
         low = np.append(rng.uniform(-10, 10, 2), 0.0)
         high = low + np.append(rng.uniform(0.2, 1.0, 2), rng.uniform(2, 9))
         if not (-5.0 < low[0] < 5.0 and -9.0 < low[1] < 1.5):
-            boxes.append((low, high))
-    clouds = [points_on(s, GROUND_SPACING_M) for s in surfaces] + [_box_points(*b) for b in boxes]
+            solids.append(Solid(low, high))
+    clouds = [points_on(s, GROUND_SPACING_M) for s in surfaces]
+    clouds += [solid.turn(_box_points(solid.low_m, solid.high_m)) for solid in solids]
     points = np.concatenate(clouds)
-    return structure_of(surfaces, points), points, boxes
+    return structure_of(surfaces, points), points, solids
 
 
 def _box_points(low: Array, high: Array) -> Array:

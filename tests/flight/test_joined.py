@@ -31,3 +31,10 @@ def test_flights_follow_each_other_and_nothing_is_lost() -> None:
     assert both.missed == ("a-missed", "b-missed")
     assert [error.what for error in both.errors] == ["flight 1: flight", "flight 2: flight"]
     assert [file.sha256[0] for file in (both.archive, *both.later_archives)] == ["1", "2"]
+
+
+def test_a_photo_that_a_later_flight_took_is_not_missed() -> None:
+    again = a_log("2", "b").model_copy(update={"shots": a_log("2", "a-missed").shots})
+    both = joined([a_log("1", "a"), again])
+    assert [s.photo for s in both.shots] == ["a", "a-missed"]
+    assert both.missed == ("b-missed",)

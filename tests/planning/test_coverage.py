@@ -34,7 +34,7 @@ def test_a_free_wall_is_covered_whole_from_exact_poses() -> None:
     assert seen.covered >= 0.995
     inner = np.abs(seen.uv_m).max(axis=1) < 1.0
     assert (seen.photos[inner] >= 2).mean() > 0.99
-    assert reasons(seen, {}) == ()
+    assert reasons(seen, {}, np.ones(len(seen.uv_m), dtype=bool)) == ()
 
 
 def test_a_bias_of_two_sigma_leaves_no_border_unseen() -> None:
@@ -61,7 +61,11 @@ def test_what_hides_the_wall_is_taken_off_and_named() -> None:
     hidden = (bare.covered - seen.covered) * 24.0
     shade = 0.6 * 4.0 / 2.8 * 1.224  # of its front edges, 1.2 m off the wall and 2.8 m off the camera
     assert shade - 0.1 < hidden < (0.6 + 0.2) / 0.6 * shade + 0.1  # points stand for cubes 10 cm beyond them
-    assert reasons(seen, {"hidden behind something": hidden})[0] == f"{hidden:.2f} m² hidden behind something"
+    all_of_it = np.ones(len(seen.uv_m), dtype=bool)
+    assert (
+        reasons(seen, {"hidden behind something": hidden}, all_of_it)[0]
+        == f"{hidden:.2f} m² hidden behind something"
+    )
 
 
 def test_too_far_and_too_oblique_do_not_count() -> None:

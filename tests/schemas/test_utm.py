@@ -19,12 +19,12 @@ def test_the_cn_tower() -> None:
 def test_the_middle_meridian_and_the_equator() -> None:
     found = utm_origin("31N", (500_000.0, 0.0, 0.0))
     assert (found.latitude_deg, found.longitude_deg) == pytest.approx((0.0, 3.0), abs=1e-12)
-    assert found.grid_north_deg == pytest.approx(0.0, abs=1e-12)
+    assert found.heading_deg == pytest.approx(0.0, abs=1e-12)
     assert found.grid_scale == pytest.approx(0.9996, abs=1e-9)
     north, south = utm_origin("56N", (340_000.0, 3_000_000.0, 0.0)), utm_origin("56S", (340_000.0, 7e6, 0.0))
     assert south.latitude_deg == pytest.approx(-north.latitude_deg, abs=1e-12)
     assert south.longitude_deg == pytest.approx(north.longitude_deg, abs=1e-12)
-    assert south.grid_north_deg == pytest.approx(-north.grid_north_deg, abs=1e-12)
+    assert south.heading_deg == pytest.approx(-north.heading_deg, abs=1e-12)
 
 
 @pytest.mark.parametrize("zone", ["32N", "56S"])
