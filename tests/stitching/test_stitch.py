@@ -14,6 +14,7 @@ from schemas.file import File
 from schemas.mosaic import Mosaic
 from schemas.problem import BadInput
 from schemas.settings import StitchSettings
+from tasks.stitching.task import pages
 from tests.stitching.conftest import CAMERA
 from tests.stitching.photo_sets import PhotoSet, errors_px, photo_set
 from tests.stitching.scenes import WALL, Texture, concrete, plane_points, render
@@ -50,6 +51,18 @@ def test_lies_where_the_poses_say(wall: PhotoSet, mosaic: Mosaic) -> None:
     off_mm = errors_px(mosaic, wall.truth, gauge=False) * 2.0
     assert np.median(off_mm) < 100.0
     assert mosaic.gsd_mm_px == pytest.approx(2.0, rel=0.05)
+
+
+def test_edges_and_pages_tell_how_the_photos_hold_together(mosaic: Mosaic) -> None:
+    held = [edge for edge in mosaic.edges if edge.held]
+    assert len(held) >= len(mosaic.photos)
+    assert {k for edge in held for k in edge.photos} == set(range(len(mosaic.photos)))
+    assert min(edge.matches for edge in held) > 8
+    picture, graph, table = pages({}, mosaic)
+    assert picture.markdown is not None
+    assert graph.markdown is not None
+    assert graph.markdown.startswith(f"### Match graph of wall: {len(mosaic.edges)} pairs")
+    assert [row["photo"] for row in table.table] == [photo.name for photo in mosaic.photos]
 
 
 def test_gains_undo_the_exposures(mosaic: Mosaic, true_gains: dict[str, float]) -> None:
