@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, TypeVar
 
+import yaml
 from cyclopts import Parameter
 from pydantic import BaseModel, ValidationError
 
@@ -12,6 +13,7 @@ from flows.console import StageLines, err
 from flows.console import out as console
 from flows.inspection_file import explain, read_camera_file
 from schemas.camera import Camera
+from schemas.control import Control
 from schemas.problem import BadInput, LeftOut
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -58,6 +60,19 @@ def read_contract(path: Path, contract: type[Model]) -> Model:
 def read_camera(path: Path) -> Camera:
     """CAMERA.yaml: width_px, height_px, and focal_px or focal_mm with sensor_width_mm; k1…, shutter_s."""
     return read_camera_file(path).camera()
+
+
+def read_control(path: Path) -> Control:
+    """CONTROL.yaml: targets or scale_bars, and the marks or tags that photos show them by."""
+    wanted = "targets or scale_bars, and the marks or tags that photos show them by"
+    try:
+        return Control.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    except OSError:
+        raise BadInput(str(path), "cannot be read", f"Give a YAML file with {wanted}") from None
+    except (yaml.YAMLError, UnicodeDecodeError):
+        raise BadInput(str(path), "is not valid YAML", f"Write {wanted} in it") from None
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
 
 
 def one_by_one(

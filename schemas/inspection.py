@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from schemas.camera import Camera, check_lens
 from schemas.contract import Contract, Matrix4, Vector3
+from schemas.control import Control
 from schemas.geodesy import GeoOrigin, KnownPoint
 from schemas.scanning import Scanning
 from schemas.settings import (
@@ -98,6 +99,7 @@ class Inspection(Contract):
     mission: str = "1"  # a new id flies again
     flight_log: str | tuple[str, ...] | None = None  # of an external flight; a list: a log a battery
     photos: tuple[PhotoSet, ...] = ()
+    control: dict[str, Control] = Field(default_factory=dict)  # of mosaics, by the name of their surface
     camera: CameraInput | None = None
     vehicle: Vehicle = Vehicle()
     origin: GeoOrigin | None = None

@@ -17,7 +17,7 @@ from tasks.detection.network import Probability
 EDGE = 128  # of 255: a pixel belongs to a crack from here on
 SURE = 179  # and one of a crack's pixels reaches this
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
-WEIGHTS = (1.734, 0.503, -1.336, -0.227, -6.929)  # of the features, from training.calibrate
+WEIGHTS = (0.853, 0.203, -1.802, -0.279, -3.341)  # of the features, from training.calibrate
 
 Floats = npt.NDArray[np.float64]
 
