@@ -24,7 +24,8 @@ def candidate_pairs(
     unplaced = [i for i, p in enumerate(priors) if not p.has_position]
     pairs, unsure = _by_position(priors)
     if len(priors) <= ALL_PAIRS:
-        return sorted(pairs | {_pair(i, j) for i in [*unplaced, *unsure] for j in everyone.tolist() if i != j})
+        asking_all = [*unplaced, *unsure]
+        return sorted(pairs | {_pair(i, int(j)) for i in asking_all for j in everyone if i != j})
     asking = unsure | {i: everyone[everyone != i] for i in unplaced}
     return sorted(pairs | _by_look(asking, scales, descriptors))
 
