@@ -68,6 +68,7 @@ def detect_in_photos(
 
     taken = ingest.each((s.file, s.name, s.surface, s.camera, s.pose, s.position_sigma_m) for s in sources)
     photos = usable("photos", list(sources), taken)
+    problems.extend(_control_of_nothing(inspection, {s.surface for s, _ in photos if s.stitch}))
     mosaics = _mosaics(inspection, photos, surfaces)
     mosaics = [m for _, m in usable("stitching", [None] * len(mosaics), mosaics)]
     cleaned = usable("patterns", mosaics, remove_patterns.each((m, inspection.patterns) for m in mosaics))
@@ -78,6 +79,19 @@ def detect_in_photos(
     found = usable("detection", cleaned, detect.each((m, p, settings, network) for m, p in cleaned))
     measured = usable("measurement", found, measure.each((m, p, d, inspection.detect) for (m, p), d in found))
     return Detected(tuple(Inspected(m, p, d, cracks) for ((m, p), d), cracks in measured), tuple(problems))
+
+
+def _control_of_nothing(inspection: Inspection, names: set[str]) -> list[LeftOut]:
+    """Control that names no mosaic."""
+    return [
+        LeftOut(
+            item=f"control of {name}",
+            stage="stitching",
+            what="no photos are stitched to a mosaic of this name",
+            remedy=f"The names are: {', '.join(sorted(names)) or 'none'}",
+        )
+        for name in sorted(set(inspection.control) - names)
+    ]
 
 
 def _mosaics(
@@ -94,7 +108,8 @@ def _mosaics(
         gsd_mm_px = inspection.stitch.gsd_mm_px or members[0][0].gsd_mm_px
         settings = inspection.stitch.model_copy(update={"gsd_mm_px": gsd_mm_px})
         of_photos, of_features = tuple(p for _, p, _ in members), tuple(f for *_, f in members)
-        calls.append((name, known.get(name), of_photos, of_features, settings))
+        control = inspection.control.get(name)
+        calls.append((name, known.get(name), of_photos, of_features, settings, control))
     return [*alone, *stitch.each(calls)]
 
 

@@ -10,6 +10,7 @@ from flows.plain_files import (
     one_by_one,
     photos_in,
     read_camera,
+    read_control,
     say,
     warn,
     working,
@@ -27,7 +28,12 @@ Method = Literal["hairline", "ridge", "paper", "global", "onnx"]
 
 @app.command
 def stitch(
-    folder: Path, *, out: OutFolder, gsd_mm_px: float | None = None, camera: Path | None = None
+    folder: Path,
+    *,
+    out: OutFolder,
+    gsd_mm_px: float | None = None,
+    camera: Path | None = None,
+    control: Path | None = None,
 ) -> None:
     """Stitch the photos of one surface: D/mosaic.tif, D/stitch.json (per photo: status, 3×3 homography).
 
@@ -41,6 +47,9 @@ def stitch(
         States the mosaic's scale, mm per pixel. Default: from GPS and altitude where the photos have them.
     camera:
         YAML with width_px, height_px and focal_px, where EXIF lacks or errs.
+    control:
+        YAML with targets or scale_bars, and the marks or tags that photos show them by: they fix the mosaic's
+        scale and place, or judge it. stitch.json has the residuals in mm.
     """
     from artifacts import store
     from flows.results import write_mosaic
@@ -50,6 +59,7 @@ def stitch(
     from tasks.stitching.task import stitch as stitch_photos
 
     lens = read_camera(camera) if camera else None
+    known = read_control(control) if control else None
     name = folder.resolve().name
 
     def ingested(path: Path) -> Photo:
@@ -59,10 +69,11 @@ def stitch(
         photos, left_out = one_by_one(photos_in(folder), ingested)
         settings = StitchSettings(gsd_mm_px=gsd_mm_px)
         described = tuple(features.bare(photo, settings) for photo in photos)
-        mosaic = stitch_photos.bare(name, None, tuple(photos), described, settings)
+        mosaic = stitch_photos.bare(name, None, tuple(photos), described, settings, known)
         write_mosaic(out, mosaic, copy=True)
     counts = {s: sum(p.status == s for p in mosaic.placements) for s in ("solved", "placed", "rejected")}
     say(", ".join(f"{count} {status}" for status, count in counts.items()) + f": {out / 'mosaic.tif'}")
+    say(mosaic.gauge)
     warn([*left_out, *mosaic.left_out])
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import yaml
 from cyclopts import Parameter
@@ -13,6 +13,7 @@ from flows.console import StageLines, err
 from flows.console import out as console
 from flows.inspection_file import explain
 from schemas.camera import Camera
+from schemas.control import Control
 from schemas.inspection import CameraInput
 from schemas.problem import BadInput, LeftOut
 
@@ -59,22 +60,30 @@ def read_contract(path: Path, contract: type[Model]) -> Model:
 
 def read_camera(path: Path) -> Camera:
     """CAMERA.yaml: width_px, height_px, and focal_px or focal_mm with sensor_width_mm; k1…, shutter_s."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError:
-        raise BadInput(
-            str(path), "cannot be read", "Give a YAML file with width_px, height_px, focal_px"
-        ) from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise BadInput(
-            str(path), "is not valid YAML", "Write width_px, height_px and focal_px in it"
-        ) from None
+    content = _read_yaml(path, "width_px, height_px and focal_px")
     try:
         return CameraInput.model_validate(
             content.get("camera", content) if isinstance(content, dict) else content
         ).camera()
     except ValidationError as problem:
         raise explain(str(path), problem) from None
+
+
+def read_control(path: Path) -> Control:
+    """CONTROL.yaml: targets or scale_bars, and the marks or tags that photos show them by."""
+    try:
+        return Control.model_validate(_read_yaml(path, "targets or scale_bars, and marks or tags"))
+    except ValidationError as problem:
+        raise explain(str(path), problem) from None
+
+
+def _read_yaml(path: Path, wanted: str) -> Any:
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError:
+        raise BadInput(str(path), "cannot be read", f"Give a YAML file with {wanted}") from None
+    except (yaml.YAMLError, UnicodeDecodeError):
+        raise BadInput(str(path), "is not valid YAML", f"Write {wanted} in it") from None
 
 
 def one_by_one(

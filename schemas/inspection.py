@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from schemas.camera import Camera
 from schemas.contract import Contract, Matrix4, Vector3
+from schemas.control import Control
 from schemas.geodesy import GeoOrigin
 from schemas.scanning import Scanning
 from schemas.settings import (
@@ -94,6 +95,7 @@ class Inspection(Contract):
     mission: str = "1"  # a new id flies again
     flight_log: str | None = None  # of an external flight
     photos: tuple[PhotoSet, ...] = ()
+    control: dict[str, Control] = Field(default_factory=dict)  # of mosaics, by the name of their surface
     camera: CameraInput | None = None
     vehicle: Vehicle = Vehicle()
     origin: GeoOrigin | None = None

@@ -1,8 +1,10 @@
 """The stitched image of one surface."""
 
+import math
 from typing import Literal
 
 from schemas.contract import Contract, Matrix3, Vector2
+from schemas.control import ControlResidual
 from schemas.file import File
 from schemas.photo import Photo
 from schemas.problem import LeftOut
@@ -33,10 +35,30 @@ class Mosaic(Contract):
     width_px: int
     height_px: int
     gsd_mm_px: float | None
-    scale_from: str  # "poses", "stated GSD", "GPS", "none"
+    scale_from: str  # the gauge: "targets", "scale bars", "poses", "stated GSD", "GPS", "none"
+    scale_sigma: float | None = None  # relative 1σ of the scale, where poses or GPS tell it
     origin_uv_m: Vector2
     photos: tuple[Photo, ...]
     placements: tuple[PhotoPlacement, ...]  # one a photo, in the order of `photos`
     covered_m2: float | None
     rms_px: float | None
+    control: tuple[ControlResidual, ...] = ()  # what fixed the gauge, and what judges it
     left_out: tuple[LeftOut, ...] = ()
+
+    @property
+    def gauge(self) -> str:
+        """In words: what the scale rests on, and what control says of it."""
+        if self.gsd_mm_px is None:
+            return "scale not known"
+        words = f"{self.gsd_mm_px:.3g} mm/px from {self.scale_from}"
+        if self.scale_sigma is not None:
+            words += f" (± {100 * self.scale_sigma:.2g} %)"
+        for kind, of in (("fitted", [r for r in self.control if r.used]), ("check", self._checks)):
+            if of:
+                rms_mm = math.sqrt(sum(r.length_mm**2 for r in of) / len(of))
+                words += f"; {len(of)} {kind}: {rms_mm:.2f} mm RMS"
+        return words
+
+    @property
+    def _checks(self) -> list[ControlResidual]:
+        return [r for r in self.control if r.check]

@@ -1,72 +1,86 @@
-"""Which pairs of photos are worth matching: neighbours by their priors, else by their look."""
+"""Which pairs of photos are worth matching: neighbours by their priors, and by their look where these do not
+tell."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from tasks.stitching.matching import Descriptors, match
 from tasks.stitching.prior import Prior
+from tasks.stitching.tracks import Index
 from tasks.stitching.view import Array
 
 NEIGHBOURS = 12  # most pairs a photo asks for: keeps the cost linear in photos
 ALL_PAIRS = 24  # photos without positions, up to which every pair is tried
 LARGEST = 300  # features by which photos are compared before they are matched
+WITHIN = 100  # most photos that one is compared with by look where its position is too unsure to choose
 
 
 def candidate_pairs(
     priors: Sequence[Prior], scales: Sequence[Array], descriptors: Sequence[Descriptors]
 ) -> list[tuple[int, int]]:
     """Sorted pairs (i < j) that may overlap."""
+    everyone = np.arange(len(priors))
     unplaced = [i for i, p in enumerate(priors) if not p.has_position]
-    pairs = _by_position(priors)
-    if unplaced and len(priors) <= ALL_PAIRS:
-        pairs |= {(min(i, j), max(i, j)) for i in unplaced for j in range(len(priors)) if i != j}
-    elif unplaced:
-        pairs |= _by_look(unplaced, scales, descriptors)
-    return sorted(pairs)
+    pairs, unsure = _by_position(priors)
+    if len(priors) <= ALL_PAIRS:
+        return sorted(pairs | {_pair(i, j) for i in [*unplaced, *unsure] for j in everyone if i != j})
+    asking = unsure | {i: everyone[everyone != i] for i in unplaced}
+    return sorted(pairs | _by_look(asking, scales, descriptors))
 
 
-def _by_position(priors: Sequence[Prior]) -> set[tuple[int, int]]:
-    """Footprints, grown by three sigma of their error, that meet; the nearest of each."""
-    placed = [i for i, p in enumerate(priors) if p.has_position]
+def _pair(i: int, j: int) -> tuple[int, int]:
+    return min(int(i), int(j)), max(int(i), int(j))
+
+
+def _by_position(priors: Sequence[Prior]) -> tuple[set[tuple[int, int]], dict[int, Index]]:
+    """Footprints, grown by three sigma of their error, that meet: the nearest of each. Where two photos'
+    errors reach half the usual way to these, the nearest need not be neighbours: then all others too."""
+    placed = np.array([i for i, p in enumerate(priors) if p.has_position], np.int64)
     if len(placed) < 2:
-        return set()
+        return set(), {}
     centres = np.array([priors[i].view.centre_uv for i in placed])
     reach = np.array([_reach(priors[i]) for i in placed])
     distance = np.linalg.norm(centres[:, None] - centres[None], axis=2)
     meets = distance < reach[:, None] + reach[None]
     np.fill_diagonal(meets, False)
+    usual = float(np.median(np.sort(distance, axis=1)[:, min(NEIGHBOURS, len(placed) - 1)]))
     pairs: set[tuple[int, int]] = set()
+    unsure: dict[int, Index] = {}
     for row, i in enumerate(placed):
         near = np.flatnonzero(meets[row])
-        near = near[np.argsort(distance[row, near], kind="stable")][:NEIGHBOURS]
-        pairs |= {(min(i, placed[k]), max(i, placed[k])) for k in near}
-    return pairs
+        near = placed[near[np.argsort(distance[row, near], kind="stable")]]
+        pairs |= {_pair(i, j) for j in near[:NEIGHBOURS]}
+        if len(near) > NEIGHBOURS and np.sqrt(2.0) * _error(priors[i]) > usual / 2.0:
+            unsure[int(i)] = near[:WITHIN]
+    return pairs, unsure
+
+
+def _error(prior: Prior) -> float:
+    """1σ of where the photo's middle lies on the plane."""
+    swing = prior.view.C[2] * float(np.max(prior.sigma_rotation[:2]))
+    return float(np.hypot(np.max(prior.sigma_position[:2]), swing))
 
 
 def _reach(prior: Prior) -> float:
     """Radius of the footprint plus three sigma of where it may lie; infinite at an unknown distance."""
     if not np.isfinite(prior.sigma_position[2]):
         return float("inf")
-    outline = prior.view.outline_uv
-    radius = float(np.nanmax(np.linalg.norm(outline - prior.view.centre_uv, axis=1)))
-    swing = prior.view.C[2] * float(np.max(prior.sigma_rotation[:2]))
-    return radius + 3.0 * float(np.hypot(np.max(prior.sigma_position[:2]), swing))
+    view = prior.view
+    radius = float(np.nanmax(np.linalg.norm(view.outline_uv - view.centre_uv, axis=1)))
+    return radius + 3.0 * _error(prior)
 
 
 def _by_look(
-    unplaced: Sequence[int], scales: Sequence[Array], descriptors: Sequence[Descriptors]
+    asking: Mapping[int, Index], scales: Sequence[Array], descriptors: Sequence[Descriptors]
 ) -> set[tuple[int, int]]:
-    """The photos that share most of their largest features with each."""
+    """asking: photo → those to compare it with. The photos that share most of their largest features."""
     few = [d[np.argsort(-s, kind="stable")[:LARGEST]] for s, d in zip(scales, descriptors, strict=True)]
-    score = np.zeros((len(few), len(few)))
-    asking = set(unplaced)
-    for i in range(len(few)):
-        for j in range(i + 1, len(few)):
-            if i in asking or j in asking:
-                score[i, j] = score[j, i] = len(match(few[i], few[j]))
+    to_compare = sorted({_pair(i, j) for i, others in asking.items() for j in others})
+    shared = {(i, j): len(match(few[i], few[j])) for i, j in to_compare}
     pairs: set[tuple[int, int]] = set()
-    for i in unplaced:
-        best = np.argsort(-score[i], kind="stable")[:NEIGHBOURS]
-        pairs |= {(min(i, int(j)), max(i, int(j))) for j in best if score[i, j] > 0}
+    for i, others in asking.items():
+        score = np.array([shared[_pair(i, j)] for j in others])
+        best = np.argsort(-score, kind="stable")[:NEIGHBOURS]
+        pairs |= {_pair(i, others[k]) for k in best if score[k] > 0}
     return pairs

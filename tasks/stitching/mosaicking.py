@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from schemas.control import Control, ControlResidual
 from schemas.photo import Photo
-from schemas.problem import BadInput
+from schemas.problem import BadInput, LeftOut
 from schemas.settings import StitchSettings
 from schemas.surface import Surface
 from tasks.stitching.canvas import Canvas, lay_out
 from tasks.stitching.compositing import Pixels, Tile, composite
+from tasks.stitching.control import Gauge, Sightings, fix_gauge, judged, placed_marks
 from tasks.stitching.gain import solve_light
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.placement import Fate, fates, unusable
@@ -20,6 +22,7 @@ from tasks.stitching.seams import darkness
 from tasks.stitching.solution import Solved, neighbours, solve
 from tasks.stitching.view import Array
 
+NOTHING: Sightings = {}
 PLACED_WORTH = 1e-3  # a photo placed by its pose alone fills only what no solved photo shows
 
 
@@ -33,8 +36,9 @@ class Registered:
     canvas: Canvas
     surface: Surface | None  # whose frame the canvas is in
     scale_from: str
-    unit_m: float  # of the adjustment's plane units on the canvas
     pairs: tuple[tuple[int, int], ...]  # neighbours among the photos that are in the mosaic
+    control: tuple[ControlResidual, ...] = ()
+    control_left_out: tuple[LeftOut, ...] = ()
 
     @property
     def shown(self) -> list[int]:
@@ -48,8 +52,10 @@ def register_photos(
     features: Sequence[PhotoFeatures],
     settings: StitchSettings,
     on_progress: Callable[[float], None],
+    control: Control | None = None,
+    sightings: Sightings = NOTHING,
 ) -> Registered:
-    """Raises BadInput where no photo finds a place."""
+    """Raises BadInput where no photo finds a place. sightings: where the photos show control's marks."""
     bad = unusable(photos, settings.min_sharpness)
     good = [i for i in range(len(photos)) if i not in bad]
     kept, kept_features = [photos[i] for i in good], [features[i] for i in good]
@@ -71,15 +77,35 @@ def register_photos(
             f"none of its {len(photos)} photos finds a place ({photos[0].name}: {every[0].reason})",
             "Give photos that overlap by a third or more, or their poses",
         )
-    scale_from, unit_m = frame.scale_from, 1.0
-    if frame.surface is None and settings.gsd_mm_px is not None:
-        unit_m = settings.gsd_mm_px / 1000.0 / _usual_gsd(every)
-        every, scale_from = [_scaled(fate, unit_m) for fate in every], "stated GSD"
+    solved, scale_from = _reindexed(solved, good), frame.scale_from
+    marks = placed_marks(sightings, solved.views)
+    views = [fate.view for fate in every if fate.view is not None]
+    usual_gsd = float(np.median([view.units_per_px for view in views]))
+    gauge = fix_gauge(name, control, marks, usual_gsd, views) if control else None
+    if gauge is None and frame.surface is None and settings.gsd_mm_px is not None:
+        gauge = Gauge(settings.gsd_mm_px / 1000.0 / usual_gsd, 0.0, np.zeros(2), "stated GSD")
+    if gauge is not None:
+        every, solved = [_moved(fate, gauge) for fate in every], _gauged(solved, gauge)
+        marks, scale_from = placed_marks(sightings, solved.views), gauge.scale_from
+    residuals, left_out = (
+        ((), ())
+        if control is None
+        else judged(control, marks, gauge, frame.surface is not None, scale_from != "none")
+    )
     gsd = None if settings.gsd_mm_px is None else settings.gsd_mm_px / 1000.0
     canvas = lay_out(name, [f.view for f in every if f.view is not None], frame.surface, gsd)
-    indexed = _reindexed(solved, good)
     among = tuple((good[a], good[b]) for a, b in pairs if every[good[a]].view and every[good[b]].view)
-    return Registered(tuple(photos), tuple(every), indexed, canvas, frame.surface, scale_from, unit_m, among)
+    return Registered(
+        tuple(photos),
+        tuple(every),
+        solved,
+        canvas,
+        frame.surface,
+        scale_from,
+        among,
+        residuals,
+        left_out,
+    )
 
 
 def blend_photos(
@@ -129,12 +155,17 @@ def _renumbered(source: npt.NDArray[np.uint16], shown: Sequence[int]) -> npt.NDA
     return np.array([0, *(i + 1 for i in shown)], np.uint16)[source]
 
 
-def _usual_gsd(every: Sequence[Fate]) -> float:
-    return float(np.median([f.view.units_per_px for f in every if f.view is not None]))
+def _moved(fate: Fate, gauge: Gauge) -> Fate:
+    if fate.view is None:
+        return fate
+    return replace(fate, view=fate.view.moved(gauge.scale, gauge.angle_rad, gauge.shift))
 
 
-def _scaled(fate: Fate, scale: float) -> Fate:
-    return fate if fate.view is None else replace(fate, view=fate.view.moved(scale, 0.0, np.zeros(2)))
+def _gauged(solved: Solved, gauge: Gauge) -> Solved:
+    c, s = np.cos(gauge.angle_rad), np.sin(gauge.angle_rad)
+    J = gauge.scale * np.array([[c, -s], [s, c]])
+    views = {i: view.moved(gauge.scale, gauge.angle_rad, gauge.shift) for i, view in solved.views.items()}
+    return replace(solved, views=views, covariance={i: J @ two @ J.T for i, two in solved.covariance.items()})
 
 
 def _reindexed(solved: Solved, good: Sequence[int]) -> Solved:

@@ -12,6 +12,7 @@ from artifacts.mosaic import MosaicWriter
 from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of, thumbnail
 from schemas.contract import Matrix3, Vector2
+from schemas.control import Control
 from schemas.mosaic import Mosaic, PhotoPlacement
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput, LeftOut
@@ -21,10 +22,12 @@ from tasks.stage import progress, stage
 
 if TYPE_CHECKING:
     from tasks.stitching.compositing import Pixels, Tile
+    from tasks.stitching.control import Sightings
     from tasks.stitching.mosaicking import Registered
     from tasks.stitching.pairs import PhotoFeatures
     from tasks.stitching.view import Array
 
+POSITIONS = ("poses", "GPS")  # gauges whose error the adjustment tells
 REMEDY = {
     "blurred": "Shoot it again, slower or with a shorter exposure",
     "the same": "Nothing to do",
@@ -37,8 +40,7 @@ def pages(inputs: Mapping[str, Any], mosaic: Mosaic) -> list[Page]:
         f"{sum(p.status == status for p in mosaic.placements)} {status}"
         for status in ("solved", "placed", "rejected")
     )
-    gsd = "scale not known" if mosaic.gsd_mm_px is None else f"{mosaic.gsd_mm_px:.3g} mm/px"
-    text = f"### Mosaic of {mosaic.name}: {counts}; {gsd} from {mosaic.scale_from}"
+    text = f"### Mosaic of {mosaic.name}: {counts}; {mosaic.gauge}"
     rows = [
         {
             "photo": p.name,
@@ -63,6 +65,7 @@ def stitch(
     photos: tuple[Photo, ...],
     features: tuple[Features, ...],
     settings: StitchSettings,
+    control: Control | None = None,
 ) -> Mosaic:
     """One mosaic of all photos of a surface; every photo is solved, placed or rejected with a reason."""
     from tasks.stitching.mosaicking import blend_photos, register_photos
@@ -72,8 +75,12 @@ def stitch(
     described = {f.photo: f for f in features}
     ordered = sorted(photos, key=lambda p: p.name)
     found = [_features(described[p.name]) for p in ordered]
-    registered = register_photos(name, surface, ordered, found, settings, lambda f: progress(0.5 * f))
-    gains, tiles = blend_photos(registered, _reader(ordered), lambda f: progress(0.5 + 0.5 * f))
+    read = _reader(ordered)
+    sightings, not_there = _sightings(control, ordered, read) if control else ({}, ())
+    registered = register_photos(
+        name, surface, ordered, found, settings, lambda f: progress(0.5 * f), control, sightings
+    )
+    gains, tiles = blend_photos(registered, read, lambda f: progress(0.5 + 0.5 * f))
     canvas, metric = registered.canvas, registered.scale_from != "none"
     placements = tuple(_placement(registered, i, float(gains[i])) for i in range(len(ordered)))
     solved = registered.solved
@@ -86,6 +93,7 @@ def stitch(
         height_px=canvas.height_px,
         gsd_mm_px=canvas.gsd * 1000.0 if metric else None,
         scale_from=registered.scale_from,
+        scale_sigma=solved.sigma_scale if solved.views and registered.scale_from in POSITIONS else None,
         origin_uv_m=(canvas.left, canvas.top) if metric else (0.0, 0.0),
         photos=tuple(_as_adjusted(registered, i) for i in range(len(ordered))),
         placements=placements,
@@ -94,7 +102,10 @@ def stitch(
             LeftOut(item=p.name, stage="stitching", what=p.reason, remedy=_remedy(p.reason))
             for p in placements
             if p.status == "rejected"
-        ),
+        )
+        + not_there
+        + registered.control_left_out,
+        control=registered.control,
     )
 
 
@@ -125,6 +136,35 @@ def _features(features: Features) -> "PhotoFeatures":
 
     with np.load(store.current().path(features.file)) as arrays:
         return PhotoFeatures(arrays["xy"], arrays["scale"], arrays["response"], arrays["descriptors"])
+
+
+def _sightings(
+    control: Control, photos: list[Photo], read: Callable[[int], "Pixels"]
+) -> tuple["Sightings", tuple[LeftOut, ...]]:
+    """Where the photos show the marks, as stated and as tags are found; stated photos that are not there."""
+    from tasks.stitching.tags import find_tags
+
+    number = {photo.name: i for i, photo in enumerate(photos)}
+    stated = [(m, photo, pixel) for m, seen in control.marks.items() for photo, pixel in seen.items()]
+    missing = tuple(
+        LeftOut(
+            item=f"mark {mark}",
+            stage="stitching",
+            what=f"there is no readable photo {photo} in this set",
+            remedy="Correct the photo's name, with its suffix",
+        )
+        for mark, photo, _ in stated
+        if photo not in number
+    )
+    sightings: dict[str, dict[int, Array]] = {}
+    for mark, photo, pixel in stated:
+        if photo in number:
+            sightings.setdefault(mark, {})[number[photo]] = np.asarray(pixel, float)
+    if control.tags is not None:
+        for i in range(len(photos)):
+            for mark, centre in find_tags(read(i), control.tags).items():
+                sightings.setdefault(mark, {}).setdefault(i, centre)
+    return sightings, missing
 
 
 def _reader(photos: list[Photo]) -> Callable[[int], "Pixels"]:
@@ -159,7 +199,7 @@ def _covariance_mm2(registered: "Registered", index: int) -> tuple[Vector2, Vect
     """None where no scale is known, or no match holds the photo."""
     if registered.scale_from == "none" or index not in registered.solved.covariance:
         return None
-    (a, b), (c, d) = registered.solved.covariance[index] * registered.unit_m**2 * 1e6
+    (a, b), (c, d) = registered.solved.covariance[index] * 1e6
     return (float(a), float(b)), (float(c), float(d))
 
 
