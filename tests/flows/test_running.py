@@ -23,7 +23,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     write_inspection(tmp_path / "site")
 
     def run_it(*redo: str, expect: int = 0) -> str:
-        assert running.run_inspection("site/inspection.yaml", None, redo, None, None) == expect
+        assert running.run_inspection("site/inspection.yaml", None, redo, None, ()) == expect
         return capsys.readouterr().out
 
     return run_it
