@@ -33,6 +33,17 @@ class Canvas:
         """(N, 2) plane points of (N, 2) mosaic pixels."""
         return np.column_stack([self.left + xy[:, 0] * self.gsd, self.top - xy[:, 1] * self.gsd])
 
+    def in_cells(self, cell_px: int) -> "Canvas":
+        """Whose pixels are cells of so many of this one's, the last ones cut."""
+        middle = (cell_px - 1) / 2 * self.gsd
+        return Canvas(
+            self.left + middle,
+            self.top - middle,
+            self.gsd * cell_px,
+            -(-self.width_px // cell_px),
+            -(-self.height_px // cell_px),
+        )
+
     def bounds_px(self, view: View) -> tuple[int, int, int, int]:
         """x0, y0, x1, y1 of the pixels that the photo may cover, cut to the canvas; x1, y1 excluded."""
         outline = view.outline_uv

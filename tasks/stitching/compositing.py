@@ -14,7 +14,7 @@ import numpy.typing as npt
 from tasks.stitching.blending import ALIGN, REACH, MultiBand
 from tasks.stitching.canvas import Canvas
 from tasks.stitching.gain import Light, gain_table, unvignetted
-from tasks.stitching.seams import label_window, photo_map
+from tasks.stitching.seams import Partition, label_window, partition, photo_map
 from tasks.stitching.view import View, shrunk
 
 Pixels = npt.NDArray[np.uint8]
@@ -56,10 +56,13 @@ def composite(
     views: Sequence[View],
     worth: Sequence[float],
     light: Light,
+    dark: Sequence[npt.NDArray[np.float32]],
     read: Callable[[int], Pixels],
     on_progress: Callable[[float], None],
 ) -> Iterator[Tile]:
-    """Tiles of TILE_PX, row by row, boustrophedon. `read(i)` gives the photo of views[i] as RGB."""
+    """Tiles of TILE_PX, row by row, boustrophedon. `read(i)` gives the photo of views[i] as RGB; `dark`:
+    the photos' darkness, for the seams."""
+    parted = partition(views, worth, canvas, dark)
     shrink = [max(1, int(canvas.gsd / v.units_per_px + 0.25)) for v in views]
     used = [shrunk(v, s) for v, s in zip(views, shrink, strict=True)]
     tables = [np.stack([gain_table(float(g)) for g in gains], axis=1)[None] for gains in light.gains]
@@ -79,7 +82,7 @@ def composite(
         for start in range(0, len(corners), workers):
             batch = corners[start : start + workers]
             yield from threads.map(
-                lambda corner: _tile(corner, canvas, used, worth, tables, light, cache), batch
+                lambda corner: _tile(corner, canvas, used, worth, parted, tables, light, cache), batch
             )
             on_progress(min(1.0, (start + workers) / len(corners)))
 
@@ -95,6 +98,7 @@ def _tile(
     canvas: Canvas,
     views: Sequence[View],
     worth: Sequence[float],
+    parted: Partition,
     tables: Sequence[npt.NDArray[np.float32]],
     light: Light,
     read: Callable[[int], Pixels],
@@ -104,7 +108,7 @@ def _tile(
     # The window reaches beyond the tile by what blending sees, beyond the canvas too.
     wx, wy = x - REACH, y - REACH
     ww, wh = TILE_PX + 2 * REACH, TILE_PX + 2 * REACH
-    label = label_window(views, worth, canvas, wx, wy, ww, wh)
+    label = label_window(views, worth, canvas, parted, wx, wy, ww, wh)
     blend = MultiBand(ww, wh)
     for i in np.unique(label[label >= 0]):
         mine = label == i

@@ -18,6 +18,7 @@ from tasks.stitching.gain import solve_light
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.placement import Fate, fates, unusable
 from tasks.stitching.prior import plane_frame
+from tasks.stitching.seams import darkness
 from tasks.stitching.solution import Solved, neighbours, solve
 from tasks.stitching.view import Array
 
@@ -115,9 +116,16 @@ def blend_photos(
     position = {i: k for k, i in enumerate(shown)}
     views = [view for i in shown if (view := registered.fates[i].view) is not None]
     pairs = [(position[a], position[b]) for a, b in registered.pairs]
+    dark: list[npt.NDArray[np.float32]] = []
+
+    def read_once(k: int) -> Pixels:
+        pixels = read(shown[k])
+        dark.append(darkness(pixels))
+        return pixels
+
     light = solve_light(
         views,
-        lambda k: read(shown[k]),
+        read_once,
         pairs,
         [registered.photos[i].metered_ev for i in shown],
         lambda f: on_progress(0.3 * f),
@@ -129,6 +137,7 @@ def blend_photos(
         views,
         [_worth(registered, i) for i in shown],
         light,
+        dark,
         lambda k: read(shown[k]),
         lambda f: on_progress(0.3 + 0.7 * f),
     )

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import tifffile
 
 from artifacts import store
 from flows.console import out
@@ -31,6 +32,7 @@ from tests.benchmarks.wall_photos import CASES, GSD_M, Case, WallPhotos, wall_ph
 Array = npt.NDArray[np.float64]
 
 BARS = {"plane": (0.15, 1.0), "k1": (0.3, None), "rolling": (0.5, None)}  # px RMS, px worst
+STEP_P95, STEP_WORST = 0.5, 2.0  # px
 IN_99 = 9.2103  # d² of two numbers that holds 99 %
 
 
@@ -40,6 +42,7 @@ class Run:
     mosaic: Mosaic
     refused: dict[str, str]  # before stitching, by name
     cpu_s: float
+    steps_px: Array  # across seams
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,29 @@ def run(photos: WallPhotos) -> Run:
     settings = StitchSettings()
     described = tuple(features.bare(photo, settings) for photo in taken)
     mosaic = stitch.bare("wall", photos.face.surface(), tuple(taken), described, settings)
-    return Run(photos, mosaic, refused, time.process_time() - began)
+    cpu_s = time.process_time() - began
+    return Run(photos, mosaic, refused, cpu_s, seam_steps_px(mosaic, photos))
+
+
+def seam_steps_px(mosaic: Mosaic, photos: WallPhotos) -> Array:
+    """(N,) at pixels where two photos meet: how far apart on the wall lies what they show there."""
+    source = tifffile.imread(store.current().path(mosaic.source), level=0).astype(np.int64)
+    across = np.argwhere((source[:, 1:] != source[:, :-1]) & (source[:, 1:] > 0) & (source[:, :-1] > 0))
+    down = np.argwhere((source[1:] != source[:-1]) & (source[1:] > 0) & (source[:-1] > 0))
+    beside, below = np.tile(across, 2) + np.array([0, 0, 0, 1]), np.tile(down, 2) + np.array([0, 0, 1, 0])
+    seams = np.concatenate([beside, below])
+    pairs = np.column_stack([source[seams[:, 0], seams[:, 1]], source[seams[:, 2], seams[:, 3]]]) - 1
+    steps = [np.zeros(0)]
+    for i, j in np.unique(pairs, axis=0):
+        if not {mosaic.photos[i].name, mosaic.photos[j].name} <= photos.truth.keys():
+            continue
+        at = seams[(pairs == [i, j]).all(axis=1)][:, [1, 0]].astype(float)
+        shown = [
+            photos.truth[mosaic.photos[k].name].see(_in_photo(mosaic.photos[k], mosaic.placements[k], at))
+            for k in (i, j)
+        ]
+        steps.append(np.linalg.norm(shown[0] - shown[1], axis=1) / GSD_M)
+    return np.concatenate(steps)
 
 
 def errors(mosaic: Mosaic, photos: WallPhotos) -> Errors:
@@ -115,6 +140,14 @@ def _on_plane(mosaic: Mosaic, photo: Photo, placement: PhotoPlacement, px: Array
     return np.asarray(xy * (mosaic.gsd_mm_px or 0.0) / 1000.0 * [1, -1] + mosaic.origin_uv_m)
 
 
+def _in_photo(photo: Photo, placement: PhotoPlacement, xy: Array) -> Array:
+    """(N, 2) pixels of the photo as taken that the mosaic shows at (N, 2) of its own."""
+    camera = photo.camera
+    q = np.linalg.solve(np.array(placement.H_mosaic_photo), np.column_stack([xy, np.ones(len(xy))]).T).T
+    ideal = (q[:, :2] / q[:, 2:] - camera.principal_px) / camera.focal_px
+    return np.asarray(camera.distort(ideal) * camera.focal_px + camera.principal_px)
+
+
 def _after_similarity(found: Sequence[Array], real: Sequence[Array]) -> Array:
     """(N, 2) what is left of found − real after the best turn, scale and shift."""
     z, w = np.concatenate(found) @ [1, 1j], np.concatenate(real) @ [1, 1j]
@@ -148,6 +181,7 @@ def rows_of(case: Case, runs: Sequence[Run], data: str) -> list[dict[str, Any]]:
     known: dict[str, Any] = {"data": data, "seed": f"1..{len(runs)}"}
     rms_bar, worst_bar = BARS.get(case.name, (None, None))
     d2 = np.concatenate([s.d2 for s in scores])
+    steps = np.concatenate([run.steps_px for run in runs])
     own = [p.status for run in runs for p in run.mosaic.placements if p.name in run.photos.truth]
     strangers = sum(
         p.status != "rejected" and p.name not in run.photos.truth
@@ -159,6 +193,8 @@ def rows_of(case: Case, runs: Sequence[Run], data: str) -> list[dict[str, Any]]:
         row(f"{case.what}: worst error", max(s.worst_px for s in scores), "px", most=worst_bar, **known),
         row(f"{case.what}: mean d²/2", d2.mean() / 2, "1", least=0.8, most=1.2, **known),
         row(f"{case.what}: inside 99 %", 100 * (d2 < IN_99).mean(), "%", least=97, **known),
+        row(f"{case.what}: step across seams, P95", np.percentile(steps, 95), "px", most=STEP_P95, **known),
+        row(f"{case.what}: step across seams, worst", steps.max(), "px", most=STEP_WORST, **known),
         row(f"{case.what}: gain error", 100 * max(s.gain for s in scores), "%", most=0.5, **known),
         row(f"{case.what}: lost of {len(own)} photos", own.count("rejected"), "photos", most=0, **known),
         row(f"{case.what}: strangers taken in", strangers, "photos", most=0, **known),

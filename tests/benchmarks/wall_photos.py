@@ -7,6 +7,7 @@ of. One millimetre a pixel at any size: lens errors, relief and shutter then wei
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,7 @@ class Shown:
     px: Array
     uv_m: Array
     exposed: float  # factor on linear light
+    see: Callable[[Array], Array]  # (N, 2) metres of the wall at any (N, 2) of its pixels
 
 
 @dataclass(frozen=True)
@@ -109,8 +111,8 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
         poses[name] = CameraPose(
             position_m=(position[0], position[1], position[2]), yaw_deg=0.0, pitch_deg=0.0
         )
-        px = _grid(true_camera)
-        truth[name] = Shown(px, _seen(true_camera, shot, face, relief, px), float(gain))
+        px, see = _grid(true_camera), partial(_seen, true_camera, shot, face, relief)
+        truth[name] = Shown(px, see(px), float(gain), see)
     if not said.is_file():
         folder.mkdir(parents=True, exist_ok=True)
         usual = automatic_gain(expose(true_camera, shots[0].pose, shots[0].motion, scene.arrays, scene.look))
