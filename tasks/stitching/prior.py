@@ -3,7 +3,7 @@
 Positions are as weak as they truly are: they choose candidates, anchor scale and place, and no more."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,7 +41,8 @@ class PlaneFrame:
 
 
 def plane_frame(photos: Sequence[Photo], surface: Surface | None) -> PlaneFrame:
-    """From poses and a surface; from poses alone; from GPS; or from nothing."""
+    """From poses and a surface; from poses alone; from GPS, over the ground or before a wall; or from
+    nothing."""
     posed = [p for p in photos if p.pose is not None]
     if surface is not None and posed:
         R, origin = surface.R_world_surface, np.asarray(surface.origin_m)
@@ -49,11 +50,24 @@ def plane_frame(photos: Sequence[Photo], surface: Surface | None) -> PlaneFrame:
         return PlaneFrame(surface, "poses", priors, _bias(priors))
     if len(posed) >= 2:
         return _own_plane(photos, [p.pose for p in posed if p.pose is not None])
-    located = [p for p in photos if p.gps is not None]
-    if len(located) >= 2:
-        return _ground_plane(photos)
+    frame = _from_everyones_gps(photos)
+    if frame is not None and any(p.has_position for p in frame.priors):
+        return frame
     facing = tuple(_facing(p, 1.0) for p in photos)
     return PlaneFrame(None, "none", facing, np.zeros(3))
+
+
+def _from_everyones_gps(photos: Sequence[Photo]) -> PlaneFrame | None:
+    """Over the ground, or before a wall; None where GPS does not tell places on the plane."""
+    located = [p for p in photos if p.gps is not None]
+    if len(located) < 2:
+        return None
+    poses = [pose for p in located if (pose := _pose_from_gps(p, located)) is not None]
+    if len(poses) < 2 or _looks_down(poses):
+        return _ground_plane(photos)
+    if not any(pose.position_m[2] for pose in poses):
+        return None  # before a wall half of the place is the height, which is not known
+    return replace(_own_plane(_posed(photos, located), poses), scale_from="GPS")
 
 
 def _bias(priors: Sequence[Prior]) -> Array:
@@ -82,6 +96,33 @@ def _from_pose(photo: Photo, R_world_plane: Array, origin: Array, sigma_w: float
     return Prior(view, sigma, np.radians([TILT_DEG, TILT_DEG, TILT_DEG]))
 
 
+def _looks_down(poses: Sequence[CameraPose]) -> bool:
+    """Most photos look more down than ahead: at the ground, not at a wall or from below at a deck."""
+    return bool(np.median([pose.R_world_camera[2, 2] for pose in poses]) < -np.sqrt(0.5))
+
+
+def _posed(photos: Sequence[Photo], located: Sequence[Photo]) -> list[Photo]:
+    """With the poses that GPS and gimbal tell."""
+    return [p if p.gps is None else p.model_copy(update={"pose": _pose_from_gps(p, located)}) for p in photos]
+
+
+def _pose_from_gps(photo: Photo, located: Sequence[Photo]) -> CameraPose | None:
+    """East, north and height above take-off from the mean of all; None without gimbal angles."""
+    if photo.gps is None or photo.view_deg is None:
+        return None
+    latitude, longitude, height = photo.gps
+    east, north, _ = _origin_of(located).to_enu(latitude, longitude, 0.0)
+    yaw, pitch, roll = photo.view_deg
+    return CameraPose(position_m=(east, north, height), yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)
+
+
+def _origin_of(located: Sequence[Photo]) -> GeoOrigin:
+    gps = [p.gps for p in located if p.gps is not None]
+    return GeoOrigin(
+        latitude_deg=float(np.mean([g[0] for g in gps])), longitude_deg=float(np.mean([g[1] for g in gps]))
+    )
+
+
 def _own_plane(photos: Sequence[Photo], poses: Sequence[CameraPose]) -> PlaneFrame:
     """A plane square to the mean view at an unknown distance: 1 m until the matches tell."""
     normal = -np.mean([pose.R_world_camera[:, 2] for pose in poses], axis=0)
@@ -90,16 +131,20 @@ def _own_plane(photos: Sequence[Photo], poses: Sequence[CameraPose]) -> PlaneFra
     R = np.column_stack([u, v, normal])
     positions = np.array([pose.position_m for pose in poses])
     origin = positions.mean(axis=0) - normal * (1.0 + float(np.ptp(positions @ normal)))
-    priors = tuple(_from_pose(p, R, origin, np.inf) for p in photos)
+    priors = tuple(_aslant(_from_pose(p, R, origin, np.inf)) for p in photos)
     return PlaneFrame(None, "poses", priors, _bias(priors))
+
+
+def _aslant(prior: Prior) -> Prior:
+    """How the plane lies to the mean view is guessed: the tilts are no better known."""
+    tilts = np.maximum(prior.sigma_rotation, np.radians([GUESSED_TILT_DEG, GUESSED_TILT_DEG, 0.0]))
+    return replace(prior, sigma_rotation=tilts)
 
 
 def _ground_plane(photos: Sequence[Photo]) -> PlaneFrame:
     """Level ground at take-off height, u east, v north; yaw and tilt from the gimbal where it tells."""
     gps = [p.gps for p in photos if p.gps is not None]
-    origin = GeoOrigin(
-        latitude_deg=float(np.mean([g[0] for g in gps])), longitude_deg=float(np.mean([g[1] for g in gps]))
-    )
+    origin = _origin_of([p for p in photos if p.gps is not None])
     altitudes = [g[2] for g in gps if g[2] > 1.0]
     usual = float(np.median(altitudes)) if altitudes else None
     east_north = np.array([origin.to_enu(g[0], g[1], 0.0)[:2] for g in gps])

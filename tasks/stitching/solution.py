@@ -17,7 +17,7 @@ from tasks.stitching.view import Array, View
 LEAST_OBSERVATIONS = 12  # a photo with fewer points left is not held by them
 LEAST_KEPT = 0.4  # nor one most of whose points the adjustment threw out
 LARGEST_SCALE = 5.0  # against the median photo: beyond, it has shrunk to nothing or flown away
-LARGEST_RMS_PX = 3.0  # per 2 MP photo; more is a photo in a wrong place
+LARGEST_MEDIAN_PX = 3.0  # per 2 MP photo; more is a photo in a wrong place, less may be trees on the ground
 ATTEMPTS = 4
 
 
@@ -79,25 +79,27 @@ def _anchored(guess: Guess, frame: PlaneFrame) -> set[int]:
     """Photos of every connected group that its priors place; without any position, the largest group."""
     count = int(guess.component.max(initial=-1)) + 1
     held: set[int] = set()
+    nowhere = not any(prior.has_position for prior in frame.priors)
     for number in range(count):
         members = np.flatnonzero(guess.component == number)
         positioned = any(frame.priors[i].has_position for i in members)
-        if len(members) >= 2 and (positioned or (number == 0 and frame.scale_from == "none")):
+        if len(members) >= 2 and (positioned or (number == 0 and nowhere)):
             held |= {int(i) for i in members}
     return held
 
 
 def _loose(observations: Observations, adjusted: Adjusted) -> set[int]:
-    """Photos that the adjustment could not hold: too few points, most thrown out, large residuals, or a
-    scale that has run away."""
+    """Photos that the adjustment could not hold: too few points, most thrown out, most residuals large (a
+    few are wherever something stands out of the plane), or a scale that has run away."""
     photos = len(adjusted.views)
     before = np.bincount(observations.photo, minlength=photos)
     after = np.bincount(adjusted.observations.photo, minlength=photos)
-    squares = (adjusted.residual_px**2).sum(axis=1)
-    rms = np.sqrt(np.bincount(adjusted.observations.photo, squares, minlength=photos) / np.maximum(after, 1))
+    lengths = np.linalg.norm(adjusted.residual_px, axis=1)
+    usual = np.array([np.median(lengths[adjusted.observations.photo == i]) for i in np.flatnonzero(after)])
     size = np.array([v.camera.width_px * v.camera.height_px for v in adjusted.views])
-    allowed = LARGEST_RMS_PX * np.maximum(1.0, np.sqrt(size / 2.0e6))
-    bad = (after < np.maximum(LEAST_OBSERVATIONS, LEAST_KEPT * before)) | (rms > allowed)
+    allowed = LARGEST_MEDIAN_PX * np.maximum(1.0, np.sqrt(size / 2.0e6))
+    bad = after < np.maximum(LEAST_OBSERVATIONS, LEAST_KEPT * before)
+    bad[after > 0] |= usual > allowed[after > 0]
     behind = np.array([v.C[2] <= 0 or not np.isfinite(v.outline_uv).all() for v in adjusted.views])
     scale = np.log([v.units_per_px for v in adjusted.views])
     odd = np.abs(scale - np.median(scale[before > 0])) > np.log(LARGEST_SCALE)

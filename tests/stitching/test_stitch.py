@@ -11,6 +11,7 @@ from artifacts import store
 from artifacts.raster import TiffWindows
 from schemas.camera import CameraPose
 from schemas.file import File
+from schemas.geodesy import GeoOrigin
 from schemas.mosaic import Mosaic
 from schemas.problem import BadInput
 from schemas.settings import StitchSettings
@@ -259,3 +260,45 @@ def test_a_surface_that_no_photo_shows_is_an_error(wall: PhotoSet) -> None:
     photos = tuple(p.model_copy(update={"pose": away}) for p in wall.photos[:2])
     with pytest.raises(BadInput, match="no photo shows any part of this surface"):
         PhotoSet(photos, wall.features[:2], wall.truth).stitch(WALL)
+
+
+def located(wall: PhotoSet, sigma_m: float) -> PhotoSet:
+    """As a drone's photos before the wall say it: GPS, height above take-off, gimbal; no poses."""
+    origin, rng = GeoOrigin(latitude_deg=48.0, longitude_deg=11.0), np.random.default_rng(6)
+    photos = []
+    for photo in wall.photos:
+        _, pose = wall.truth[photo.name]
+        east, north, up = np.asarray(pose.position_m) + rng.normal(0, sigma_m, 3)
+        latitude, longitude, _ = origin.to_geographic((east, north, up))
+        photos.append(
+            photo.model_copy(
+                update={
+                    "pose": None,
+                    "gps": (latitude, longitude, up + 10.0),
+                    "view_deg": (pose.yaw_deg, pose.pitch_deg, 0.0),
+                    "position_sigma_m": sigma_m,
+                }
+            )
+        )
+    return PhotoSet(tuple(photos), wall.features, wall.truth)
+
+
+def test_photos_of_a_wall_need_no_more_than_gps_and_gimbal(wall: PhotoSet) -> None:
+    mosaic = located(wall, 0.1).stitch(None)
+    assert set(status(mosaic).values()) == {"solved"}
+    assert mosaic.scale_from == "GPS"
+    assert mosaic.scale_sigma is not None
+    assert 0.005 < mosaic.scale_sigma < 0.1
+    assert mosaic.gsd_mm_px == pytest.approx(2.0, rel=3 * mosaic.scale_sigma)
+    assert np.sqrt(np.mean(errors_px(mosaic, wall.truth, gauge=True) ** 2)) < 0.15
+
+
+def test_gps_without_height_tells_no_place_on_a_wall(wall: PhotoSet) -> None:
+    flat = tuple(
+        p.model_copy(update={"gps": (p.gps[0], p.gps[1], 0.0)})
+        for p in located(wall, 0.1).photos
+        if p.gps is not None
+    )
+    mosaic = PhotoSet(flat, wall.features, wall.truth).stitch(None)
+    assert set(status(mosaic).values()) == {"solved"}
+    assert (mosaic.scale_from, mosaic.gsd_mm_px, mosaic.scale_sigma) == ("none", None, None)
