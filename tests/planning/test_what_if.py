@@ -87,7 +87,7 @@ def test_a_second_pass_flies_along_the_cracks_alone() -> None:
     seen = [CAMERA.project([(0.0, 0.0, 4.5)], w.pose)[0] for w in made.shooting_points]
     inside = [np.all((px >= 0) & (px < (CAMERA.width_px, CAMERA.height_px))) for px in seen]
     assert sum(inside) >= 2
-    assert len(made.shooting_points) < 30  # the wall takes 130
+    assert len(made.shooting_points) < 40  # the wall takes 130
 
 
 def test_cracks_of_another_structure_are_refused() -> None:
