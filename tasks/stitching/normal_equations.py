@@ -3,8 +3,8 @@ remains of the photos is a banded system bordered by the shared unknowns."""
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
 
 from tasks.stitching.bundle import PER_PHOTO, Bundle, Jacobians, State, nominal_k1, prior_errors, sigma_k1
 from tasks.stitching.skyline import solve_positive
@@ -18,7 +18,8 @@ class Reduced:
 
     S: Array  # (size, size)
     g: Array  # (size,)
-    E: csr_matrix  # (size, 2 tracks) photos against tracks
+    columns: Index  # (M, 10) unknowns that each observation touches
+    mixed: Array  # (M, 2, 10) and how its track hangs together with them
     H_inverse: Array  # (tracks, 2, 2)
     h: Array  # (tracks, 2)
 
@@ -41,22 +42,19 @@ def reduced(
             PER_PHOTO * n + 2 * bundle.camera_of[bundle.photo][:, None] + np.arange(2),
         ],
         axis=1,
-    )  # (M, 10) unknowns that each observation touches
-    weighted = camera * weight[:, None, None]
-    A, g = _photo_blocks(weighted, camera, residual, columns, size)
+    )
+    A, g, mixed = np.zeros((size, size)), np.zeros(size), np.empty(camera.shape)
+    _add_observations(A, g, mixed, columns, camera, jacobians.point, residual, weight)
     _add_priors(A, g, state, bundle, trust)
     A[np.diag_indices(size)] *= 1.0 + damping
+    tiny = 1e-12 * np.diag(A)
 
     H_inverse, h = _point_blocks(jacobians.point, weight, residual, bundle.track, len(state.X), damping)
-    mixed = np.swapaxes(weighted, 1, 2) @ jacobians.point  # (M, 10, 2)
-    place = np.broadcast_to(columns[:, :, None], mixed.shape).ravel()
-    point = np.broadcast_to(2 * bundle.track[:, None, None] + np.arange(2), mixed.shape).ravel()
-    shape = (size, 2 * len(state.X))
-    E = coo_matrix((mixed.ravel(), (place, point)), shape=shape).tocsr()
-    Y = coo_matrix(((mixed @ H_inverse[bundle.track]).ravel(), (place, point)), shape=shape).tocsr()
-    S = A - (Y @ E.T).toarray()
-    S = (S + S.T) / 2 + 1e-12 * np.diag(np.diag(A))
-    return Reduced(S, g - Y @ h.ravel(), E, H_inverse, h)
+    half = np.zeros_like(A)
+    _eliminate(half, g, columns, mixed, bundle.track, H_inverse, h)
+    S = A - half - half.T
+    S[np.diag_indices(size)] += tiny
+    return Reduced(S, g, columns, mixed, H_inverse, h)
 
 
 def damped_step(
@@ -73,7 +71,8 @@ def damped_step(
     system = reduced(state, bundle, residual, jacobians, weight, trust, damping)
     d = solve_positive(system.S, -system.g, bundle.shared)
     pose, lens = d[: PER_PHOTO * n].reshape(n, PER_PHOTO), d[PER_PHOTO * n : size - 3].reshape(-1, 2)
-    back = -system.h - (system.E.T @ d).reshape(-1, 2)
+    pulled = np.einsum("mki,mi->mk", system.mixed, d[system.columns])
+    back = -system.h - _by_track(pulled, bundle.track, len(state.X))
     return State(
         R=state.R @ rotation(pose[:, :3]),
         C=state.C + pose[:, 3:6],
@@ -85,16 +84,60 @@ def damped_step(
     )
 
 
-def _photo_blocks(
-    weighted: Array, camera: Array, residual: Array, columns: Index, size: int
-) -> tuple[Array, Array]:
-    """A (size, size) and g (size,) of the observations, points held."""
-    blocks = np.swapaxes(weighted, 1, 2) @ camera
-    rows = np.broadcast_to(columns[:, :, None], blocks.shape).ravel()
-    across = np.broadcast_to(columns[:, None, :], blocks.shape).ravel()
-    A = coo_matrix((blocks.ravel(), (rows, across)), shape=(size, size)).toarray()
-    pulls = np.einsum("mki,mk->mi", weighted, residual).ravel()
-    return A, np.bincount(columns.ravel(), pulls, minlength=size).astype(np.float64)
+@numba.njit(cache=True, nogil=True)
+def _add_observations(
+    A: Array,
+    g: Array,
+    mixed: Array,
+    columns: Index,
+    camera: Array,
+    point: Array,
+    residual: Array,
+    weight: Array,
+) -> None:
+    """Into A and g, points held; and `mixed`, all in place."""
+    width = camera.shape[2]
+    for m in range(len(weight)):
+        x, y = weight[m] * camera[m, 0], weight[m] * camera[m, 1]
+        for i in range(width):
+            row = A[columns[m, i]]
+            for j in range(width):
+                row[columns[m, j]] += x[i] * camera[m, 0, j] + y[i] * camera[m, 1, j]
+            g[columns[m, i]] += x[i] * residual[m, 0] + y[i] * residual[m, 1]
+            for k in range(2):
+                mixed[m, k, i] = point[m, 0, k] * x[i] + point[m, 1, k] * y[i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _eliminate(
+    half: Array, g: Array, columns: Index, mixed: Array, track: Index, H_inverse: Array, h: Array
+) -> None:
+    """Take the tracks out of g and add what they take out of A to half + halfᵀ; observations are sorted by
+    track. Of the columns, a photo's own and its camera's each follow one another: runs that vectorise."""
+    width = columns.shape[1]
+    Y = np.empty((2, width))
+    for m in range(len(track)):
+        t = track[m]
+        for i in range(width):
+            for k in range(2):
+                Y[k, i] = H_inverse[t, k, 0] * mixed[m, 0, i] + H_inverse[t, k, 1] * mixed[m, 1, i]
+            g[columns[m, i]] -= Y[0, i] * h[t, 0] + Y[1, i] * h[t, 1]
+        for other in range(m, len(track)):
+            if track[other] != t:
+                break
+            share = 0.5 if other == m else 1.0
+            own, lens = columns[other, 0], columns[other, PER_PHOTO]
+            for i in range(width):
+                row, y0, y1 = half[columns[m, i]], share * Y[0, i], share * Y[1, i]
+                for j in range(PER_PHOTO):
+                    row[own + j] += y0 * mixed[other, 0, j] + y1 * mixed[other, 1, j]
+                for j in range(2):
+                    row[lens + j] += y0 * mixed[other, 0, PER_PHOTO + j] + y1 * mixed[other, 1, PER_PHOTO + j]
+
+
+def _by_track(values: Array, track: Index, tracks: int) -> Array:
+    """(tracks, K) sums of (M, K)."""
+    return np.stack([np.bincount(track, column, minlength=tracks) for column in values.T], axis=1)
 
 
 def _point_blocks(
@@ -102,12 +145,11 @@ def _point_blocks(
 ) -> tuple[Array, Array]:
     """(T, 2, 2) inverse damped blocks and (T, 2) gradients of the points."""
     blocks = np.einsum("mki,mkj,m->mij", point, point, weight).reshape(-1, 4)
-    a, b, _, d = (np.bincount(track, blocks[:, k], minlength=tracks).astype(np.float64) for k in range(4))
+    a, b, _, d = _by_track(blocks, track, tracks).T
     a, d = a * (1.0 + damping), d * (1.0 + damping)
     inverse = np.stack([d, -b, -b, a], axis=1) / (a * d - b * b)[:, None]
     pulls = np.einsum("mki,mk,m->mi", point, residual, weight)
-    h = [np.bincount(track, pulls[:, k], minlength=tracks).astype(np.float64) for k in range(2)]
-    return inverse.reshape(-1, 2, 2), np.stack(h, axis=1)
+    return inverse.reshape(-1, 2, 2), _by_track(pulls, track, tracks)
 
 
 def _add_priors(A: Array, g: Array, state: State, bundle: Bundle, trust: Array) -> None:
