@@ -10,7 +10,7 @@ demo: .venv/.ready
 	$(BIN)/hairline demo --out runs/demo
 
 test: .venv/.ready check
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile  # on two cores; fixtures are made once a file
 
 check: .venv/.ready
 	$(BIN)/ruff check -q

@@ -15,18 +15,18 @@ CAMERA = Camera(width_px=816, height_px=612, focal_px=2000.0, k1=-0.05, p1=0.000
 GAINS = (1.0, 1.15, 0.87, 1.05, 0.92, 1.1, 0.9, 1.0, 1.12, 0.95, 1.08, 0.88)
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="package", autouse=True)
 def own_store() -> Iterator[None]:
     with store.temporary():
         yield
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def texture() -> Texture:
     return concrete()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def wall(own_store: None, texture: Texture, tmp_path_factory: pytest.TempPathFactory) -> PhotoSet:
     """4 × 3 photos, 50 % overlap, exposures ±15 %, positions reported within 0.1 m; k1 is not known."""
     true = grid_poses(CAMERA, 4, 3, 4.0, 0.5, seed=3)
@@ -42,7 +42,7 @@ def wall(own_store: None, texture: Texture, tmp_path_factory: pytest.TempPathFac
     return photo_set(tmp_path_factory.mktemp("wall"), images, nominal, truth, poses)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def true_gains(wall: PhotoSet) -> dict[str, float]:
     """The factor that undoes each photo's exposure, geometric mean 1."""
     undo = {photo.name: 1.0 / gain for photo, gain in zip(wall.photos, GAINS, strict=True)}
