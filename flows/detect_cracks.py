@@ -11,7 +11,7 @@ from prefect import flow
 from artifacts import store
 from flows.collect_images import PhotoSource, collect
 from flows.inspection_file import existing
-from flows.model_structure import has_scans, model
+from flows.model_structure import Modelled, has_scans, model
 from flows.opening import opened
 from flows.workers import one_a_core
 from schemas.crack import Measurement
@@ -26,6 +26,7 @@ from tasks.measurement.task import measure
 from tasks.patterns.task import remove_patterns
 from tasks.photos.task import features, ingest
 from tasks.stitching.task import single, stitch
+from tasks.surfaces.task import measure_relief
 
 T = TypeVar("T")
 
@@ -52,7 +53,11 @@ class Detected:
 
 
 def detect_in_photos(
-    inspection: Inspection, base: Path, sources: tuple[PhotoSource, ...], surfaces: tuple[Surface, ...]
+    inspection: Inspection,
+    base: Path,
+    sources: tuple[PhotoSource, ...],
+    surfaces: tuple[Surface, ...],
+    modelled: Modelled | None,
 ) -> Detected:
     """Stitch each surface's photos, take the markers out, find the cracks and measure them."""
     problems: list[LeftOut] = []
@@ -69,7 +74,7 @@ def detect_in_photos(
     taken = ingest.each((s.file, s.name, s.surface, s.camera, s.pose, s.position_sigma_m) for s in sources)
     photos = usable("photos", list(sources), taken)
     problems.extend(_control_of_nothing(inspection, {s.surface for s, _ in photos if s.stitch}))
-    mosaics = _mosaics(inspection, photos, surfaces)
+    mosaics = _mosaics(inspection, photos, surfaces, modelled)
     mosaics = [m for _, m in usable("stitching", [None] * len(mosaics), mosaics)]
     cleaned = usable("patterns", mosaics, remove_patterns.each((m, inspection.patterns) for m in mosaics))
     settings = inspection.detect
@@ -95,13 +100,21 @@ def _control_of_nothing(inspection: Inspection, names: set[str]) -> list[LeftOut
 
 
 def _mosaics(
-    inspection: Inspection, photos: list[tuple[PhotoSource, Photo]], surfaces: tuple[Surface, ...]
+    inspection: Inspection,
+    photos: list[tuple[PhotoSource, Photo]],
+    surfaces: tuple[Surface, ...],
+    modelled: Modelled | None,
 ) -> list[Mosaic | BadInput]:
     """A mosaic for each surface, and one for each photo that stands for itself."""
     known = {surface.name: surface for surface in surfaces}
     alone = single.each((photo, source.gsd_mm_px) for source, photo in photos if not source.stitch)
     to_stitch = sorted(((s, p) for s, p in photos if s.stitch), key=lambda pair: pair[0].surface)
     described = features.each((photo, inspection.stitch) for _, photo in to_stitch)
+    scanned = {s.name for s in modelled.structure.surfaces} if modelled else set()
+    shown = {source.surface for source, _ in to_stitch} & scanned & known.keys()
+    seen = tuple(known[name] for name in sorted(shown))
+    reliefs = measure_relief(modelled.model, seen) if modelled and seen else ()
+    of_surface = {relief.surface: relief for relief in reliefs}
     calls = []
     for name, group in groupby(zip(to_stitch, described, strict=True), key=lambda m: m[0][0].surface):
         members = [(source, photo, f) for (source, photo), f in group if not isinstance(f, BadInput)]
@@ -109,7 +122,8 @@ def _mosaics(
         settings = inspection.stitch.model_copy(update={"gsd_mm_px": gsd_mm_px})
         of_photos, of_features = tuple(p for _, p, _ in members), tuple(f for *_, f in members)
         control = inspection.control.get(name)
-        calls.append((name, known.get(name), of_photos, of_features, settings, control))
+        surface, relief = known.get(name), of_surface.get(name)
+        calls.append((name, surface, of_photos, of_features, settings, control, relief))
     return [*alone, *stitch.each(calls)]
 
 
@@ -120,4 +134,5 @@ def detect_cracks(inspection: str = "demo:wall", out: str | None = None) -> None
         modelled = model(run.inspection, run.base) if has_scans(run.inspection) else None
         structure = modelled.structure if modelled else None
         collected = collect(run.inspection, run.base, structure, run.save_plan)
-        run.save_detected(detect_in_photos(run.inspection, run.base, collected.photos, collected.surfaces))
+        sources, surfaces = collected.photos, collected.surfaces
+        run.save_detected(detect_in_photos(run.inspection, run.base, sources, surfaces, modelled))

@@ -42,7 +42,8 @@ def inspect(run: OpenRun) -> CrackReport | None:
     collected = collect(run.inspection, run.base, structure, run.save_plan)
     run.save_collected(collected)
     if collected.photos:
-        detected = detect_in_photos(run.inspection, run.base, collected.photos, collected.surfaces)
+        photos, surfaces = collected.photos, collected.surfaces
+        detected = detect_in_photos(run.inspection, run.base, photos, surfaces, modelled)
         run.save_detected(detected)
         return report(run, modelled, collected, detected)
     if modelled is None:

@@ -3,11 +3,12 @@
 import math
 from typing import Literal
 
-from schemas.contract import Contract, Matrix3, Vector2
+from schemas.contract import Contract, Matrix3, Vector2, Vector3
 from schemas.control import ControlResidual
 from schemas.file import File
 from schemas.photo import Photo
 from schemas.problem import LeftOut
+from schemas.relief import Relief
 from schemas.surface import Surface
 
 
@@ -15,7 +16,8 @@ class PhotoPlacement(Contract):
     name: str
     status: Literal["solved", "placed", "rejected"]  # by matches; by its pose alone; not in the mosaic
     reason: str = ""  # why it was placed or rejected
-    H_mosaic_photo: Matrix3 | None = None  # undistorted photo pixels to mosaic pixels
+    H_mosaic_photo: Matrix3 | None = None  # undistorted photo pixels to mosaic pixels, of a flat surface;
+    camera_uvw_m: Vector3 | None = None  # what stands h over the plane lies h/w of the way to (u, v) of this
     matches: int = 0
     rms_px: float | None = None  # reprojection residual in the mosaic
     covariance_mm2: tuple[Vector2, Vector2] | None = None  # of where its middle lies among the others
@@ -51,6 +53,8 @@ class Mosaic(Contract):
     edges: tuple[MatchEdge, ...] = ()
     covered_m2: float | None
     rms_px: float | None
+    relief: Relief | None = None  # on which the photos are laid; None: on the plane
+    height_sigma_m: float | None = None  # 1σ of the surface over relief or plane; None: not known
     control: tuple[ControlResidual, ...] = ()  # what fixed the gauge, and what judges it
     left_out: tuple[LeftOut, ...] = ()
 
@@ -62,6 +66,9 @@ class Mosaic(Contract):
         words = f"{self.gsd_mm_px:.3g} mm/px from {self.scale_from}"
         if self.scale_sigma is not None:
             words += f" (± {100 * self.scale_sigma:.2g} %)"
+        if self.relief is not None:
+            rms_mm, sigma_mm = 1000 * self.relief.rms_m, 1000 * self.relief.sigma_m
+            words += f"; on the scans' relief ({rms_mm:.1f} mm RMS, known to {sigma_mm:.1f} mm)"
         for kind, of in (("fitted", [r for r in self.control if r.used]), ("check", self._checks)):
             if of:
                 rms_mm = math.sqrt(sum(r.length_mm**2 for r in of) / len(of))

@@ -1,4 +1,4 @@
-"""The bundle: cameras above a plane, points on it, where the photos show them, and what is known before.
+"""The bundle: cameras above a surface, points on it, where the photos show them, and what is known before.
 
 Residuals are pixels of the photos as taken, through the full model of the lens."""
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from schemas.camera import Camera
 from tasks.stitching.prior import Prior
+from tasks.stitching.relief import HeightMap
 from tasks.stitching.tracks import Index, Observations
 from tasks.stitching.view import FACING, Array, View, rolled, rotation, rotation_vector, with_lens
 
@@ -45,6 +46,7 @@ class Bundle:
     weight_position: Array  # (n, 3)
     weight_bias: Array  # (3,)
     sigma_roll: Array  # (2,) px
+    relief: HeightMap | None
 
     @property
     def shared(self) -> int:
@@ -54,7 +56,8 @@ class Bundle:
         c = int(self.camera_of[k])
         nominal = self.cameras[c]
         focal = float(nominal.focal_px * np.exp(state.log_focal[c]))
-        return View(with_lens(nominal, focal, float(state.k1[c])), state.R[k], state.C[k], state.roll[k])
+        camera = with_lens(nominal, focal, float(state.k1[c]))
+        return View(camera, state.R[k], state.C[k], state.roll[k], self.relief)
 
 
 def build_bundle(
@@ -100,6 +103,7 @@ def build_bundle(
         weight_position=np.where(np.isfinite(position), position, np.inf) ** -2.0,
         weight_bias=np.maximum(sigma_bias, 1e-9) ** -2.0,
         sigma_roll=sigma_roll,
+        relief=views[0].relief,
     )
 
 
@@ -145,7 +149,8 @@ def sigma_k1(bundle: Bundle) -> Array:
 def _ideal(state: State, bundle: Bundle) -> tuple[Array, Array]:
     """Ideal image coordinates (M, 2) and points in camera (M, 3)."""
     R, C = state.R[bundle.photo], state.C[bundle.photo]
-    offset = np.column_stack([state.X, np.zeros(len(state.X))])[bundle.track] - C
+    height = np.zeros(len(state.X)) if bundle.relief is None else bundle.relief.at(state.X)
+    offset = np.column_stack([state.X, height])[bundle.track] - C
     in_camera = np.einsum("mji,mj->mi", R, offset)
     z = np.where(in_camera[:, 2] > 1e-9, in_camera[:, 2], np.nan)
     return in_camera[:, :2] / z[:, None], in_camera
@@ -192,11 +197,14 @@ def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
     turning = np.stack([zero, -c, b, c, zero, -a, -b, a, zero], axis=1).reshape(-1, 3, 3)
     R_transposed = np.swapaxes(state.R[bundle.photo], 1, 2)
     moving = by_camera @ R_transposed
+    along = moving[:, :, :2]
+    if bundle.relief is not None:  # a point that moves on the surface rises and falls with it
+        along = along + moving[:, :, 2:] * bundle.relief.slope(state.X)[bundle.track][:, None, :]
     principal = np.array([cam.principal_px for cam in bundle.cameras])[of]
     rolling = bundle.rolled[:, None, None] * np.eye(2)
     residual = focal[:, None] * distorted + principal + state.roll[bundle.photo] * bundle.rolled[:, None]
     return residual - bundle.xy, Jacobians(
         pose=np.concatenate([by_camera @ turning, -moving, rolling], axis=2),
         lens=focal[:, None, None] * np.stack([distorted, by_k1], axis=2),
-        point=np.ascontiguousarray(moving[:, :, :2]),
+        point=np.ascontiguousarray(along),
     )

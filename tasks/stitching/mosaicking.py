@@ -18,6 +18,7 @@ from tasks.stitching.gain import solve_light
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.placement import Fate, fates, unusable
 from tasks.stitching.prior import plane_frame
+from tasks.stitching.relief import HeightMap
 from tasks.stitching.seams import darkness
 from tasks.stitching.solution import Solved, neighbours, solve
 from tasks.stitching.view import Array
@@ -54,15 +55,19 @@ def register_photos(
     on_progress: Callable[[float], None],
     control: Control | None = None,
     sightings: Sightings = NOTHING,
+    relief: HeightMap | None = None,
 ) -> Registered:
-    """Raises BadInput where no photo finds a place. sightings: where the photos show control's marks."""
+    """Raises BadInput where no photo finds a place. sightings: where the photos show control's marks;
+    relief: of the surface, which counts where the photos have poses in its frame."""
     bad = unusable(photos, settings.min_sharpness)
     good = [i for i in range(len(photos)) if i not in bad]
     kept, kept_features = [photos[i] for i in good], [features[i] for i in good]
     frame = plane_frame(kept, surface)
     pairs = neighbours(kept_features, frame)
     sigmas = [p.focal_sigma for p in kept]
-    solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress)
+    if frame.surface is None:
+        relief = None
+    solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress, relief)
     found = fates(frame.priors, solved.views, kept_features)
     if len(kept) == 1 and found[0].view is None:
         found = [

@@ -103,7 +103,8 @@ def _place(prior: Prior, priors: Sequence[Prior], solved: dict[int, View]) -> Vi
     same = [
         v.camera for k, v in solved.items() if priors[k].view.camera.model_dump() == view.camera.model_dump()
     ]
-    return replace(view, C=C, camera=same[0] if same else view.camera)
+    relief = solved[near[0]].relief
+    return replace(view, C=C, camera=same[0] if same else view.camera, relief=relief)
 
 
 def elsewhere(

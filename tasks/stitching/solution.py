@@ -8,9 +8,11 @@ import numpy as np
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.averaging import Guess, average
 from tasks.stitching.candidates import candidate_pairs
+from tasks.stitching.on_relief import on_relief
 from tasks.stitching.pairs import Edge, PhotoFeatures, match_pairs
 from tasks.stitching.placement import elsewhere
 from tasks.stitching.prior import PlaneFrame
+from tasks.stitching.relief import HeightMap
 from tasks.stitching.tracks import Observations, build_tracks
 from tasks.stitching.view import Array, View
 
@@ -31,6 +33,7 @@ class Solved:
     sigma_px: float
     edges: tuple[Edge, ...]  # that passed the pairwise test, and
     held: frozenset[tuple[int, int]]  # those among them that the whole graph agrees with
+    relief: HeightMap | None = None  # that the views look at; None: the plane
 
 
 def solve(
@@ -40,8 +43,9 @@ def solve(
     pairs: Sequence[tuple[int, int]],
     ransac_px: float,
     on_progress: Callable[[float], None],
+    relief: HeightMap | None = None,
 ) -> Solved:
-    """Views of all photos that the matches hold together."""
+    """Views of all photos that the matches hold together, on the relief where one is given and fits."""
     matched = match_pairs(pairs, features, frame.priors, ransac_px, lambda f: on_progress(0.6 * f))
     edges = matched
     for _ in range(ATTEMPTS):
@@ -51,19 +55,26 @@ def solve(
         observations = build_tracks(edges, features)
         if len(observations.photo) == 0:
             break
-        adjusted = adjust(
-            guess.views,
-            observations,
-            frame.priors,
-            frame.sigma_bias,
-            focal_sigmas,
-            lambda f: on_progress(0.6 + 0.4 * f),
-        )
+
+        def adjusted_from(views: Sequence[View], seen: Observations = observations) -> Adjusted:
+            return adjust(
+                views,
+                seen,
+                frame.priors,
+                frame.sigma_bias,
+                focal_sigmas,
+                lambda f: on_progress(0.6 + 0.4 * f),
+            )
+
+        adjusted = adjusted_from(guess.views)
         loose = _loose(observations, adjusted)
         loose |= elsewhere(
             guess.component, set(map(int, np.unique(observations.photo))), adjusted.views, frame, features
         )
         if not loose:
+            if relief is not None:
+                sigma = float(frame.sigma_bias[:2].max())
+                adjusted = on_relief(relief, adjusted, guess.views, observations, sigma, adjusted_from)
             return _solved(adjusted, matched, edges)
         edges = [e for e in edges if e.a not in loose and e.b not in loose]
     return Solved({}, {}, {}, {}, 0.0, 0.0, tuple(matched), frozenset())
@@ -120,4 +131,5 @@ def _solved(adjusted: Adjusted, matched: Sequence[Edge], held: Sequence[Edge]) -
         sigma_px=adjusted.sigma_px,
         edges=tuple(matched),
         held=frozenset((edge.a, edge.b) for edge in held),
+        relief=adjusted.views[seen[0]].relief,
     )

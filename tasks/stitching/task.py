@@ -13,11 +13,12 @@ from artifacts.mosaic import MosaicWriter
 from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of, thumbnail
 from artifacts.uncertainty_map import sigma_mm
-from schemas.contract import Matrix3, Vector2
+from schemas.contract import Matrix3, Vector2, Vector3
 from schemas.control import Control
 from schemas.mosaic import MatchEdge, Mosaic, PhotoPlacement
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput, LeftOut
+from schemas.relief import Relief
 from schemas.settings import StitchSettings
 from schemas.surface import Surface
 from tasks.stage import progress, stage
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from tasks.stitching.control import Sightings
     from tasks.stitching.mosaicking import Registered
     from tasks.stitching.pairs import PhotoFeatures
+    from tasks.stitching.relief import HeightMap
     from tasks.stitching.view import Array
 
 POSITIONS = ("poses", "GPS")  # gauges whose error the adjustment tells
@@ -77,6 +79,7 @@ def stitch(
     features: tuple[Features, ...],
     settings: StitchSettings,
     control: Control | None = None,
+    relief: Relief | None = None,
 ) -> Mosaic:
     """One mosaic of all photos of a surface; every photo is solved, placed or rejected with a reason."""
     from tasks.stitching.mosaicking import blend_photos, register_photos
@@ -89,12 +92,21 @@ def stitch(
     read = _reader(ordered)
     sightings, not_there = _sightings(control, ordered, read) if control else ({}, ())
     registered = register_photos(
-        name, surface, ordered, found, settings, lambda f: progress(0.5 * f), control, sightings
+        name,
+        surface,
+        ordered,
+        found,
+        settings,
+        lambda f: progress(0.5 * f),
+        control,
+        sightings,
+        _height_map(relief),
     )
     gains, tiles = blend_photos(registered, read, lambda f: progress(0.5 + 0.5 * f))
     canvas, metric = registered.canvas, registered.scale_from != "none"
     placements = tuple(_placement(registered, i, float(gains[i])) for i in range(len(ordered)))
     solved = registered.solved
+    on_relief = relief if solved.relief is not None else None
     squares = [solved.matches[i] * rms**2 for i, rms in solved.rms_px.items()]
     return _written(
         tiles,
@@ -112,6 +124,8 @@ def stitch(
             MatchEdge(photos=(e.a, e.b), matches=len(e.matches), held=(e.a, e.b) in solved.held)
             for e in solved.edges
         ),
+        relief=on_relief,
+        height_sigma_m=_height_sigma_m(registered.surface, on_relief),
         rms_px=float(np.sqrt(sum(squares) / sum(solved.matches.values()))) if squares else None,
         left_out=tuple(
             LeftOut(item=p.name, stage="stitching", what=p.reason, remedy=_remedy(p.reason))
@@ -151,6 +165,22 @@ def _features(features: Features) -> "PhotoFeatures":
 
     with np.load(store.current().path(features.file)) as arrays:
         return PhotoFeatures(arrays["xy"], arrays["scale"], arrays["response"], arrays["descriptors"])
+
+
+def _height_map(relief: Relief | None) -> "HeightMap | None":
+    from tasks.stitching.relief import HeightMap
+
+    if relief is None:
+        return None
+    heights = np.load(store.current().path(relief.heights)).astype(np.float64)
+    return HeightMap(heights, relief.left_m, relief.bottom_m, relief.cell_m)
+
+
+def _height_sigma_m(surface: Surface | None, relief: Relief | None) -> float | None:
+    """Of what the photos are laid on: the relief, or the plane, of which 95 % of the points lie within 2σ."""
+    if relief is not None:
+        return relief.sigma_m
+    return None if surface is None else surface.deviation_m / 2
 
 
 def _sightings(
@@ -203,11 +233,20 @@ def _placement(registered: "Registered", index: int, gain: float) -> PhotoPlacem
         status=fate.status,
         reason=fate.reason,
         H_mosaic_photo=H,
+        camera_uvw_m=_camera_uvw_m(registered, index),
         matches=solved.matches.get(index, 0),
         rms_px=solved.rms_px.get(index),
         covariance_mm2=_covariance_mm2(registered, index),
         gain=gain,
     )
+
+
+def _camera_uvw_m(registered: "Registered", index: int) -> Vector3 | None:
+    view = registered.fates[index].view
+    if view is None or registered.scale_from == "none":
+        return None
+    u, v, w = (float(x) for x in view.C)
+    return u, v, w
 
 
 def _covariance_mm2(registered: "Registered", index: int) -> tuple[Vector2, Vector2] | None:

@@ -1,7 +1,8 @@
 """A camera above the plane of the mosaic.
 
-Plane frame: u right, v up, w towards the viewer; the surface is w = 0. Metres where a scale is known, else
-the units of the first guess. Poses are camera-to-plane, as CameraPose gives them for the world."""
+Plane frame: u right, v up, w towards the viewer; the surface is w = 0, or the view's relief over it. Metres
+where a scale is known, else the units of the first guess. Poses are camera-to-plane, as CameraPose gives them
+for the world."""
 
 from dataclasses import dataclass, field, replace
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.camera import Camera
+from tasks.stitching.relief import HeightMap
 
 Array = npt.NDArray[np.float64]
 
@@ -22,12 +24,13 @@ class View:
     R: Array  # (3, 3) R_plane_camera: columns are the camera's axes in the plane frame
     C: Array  # (3,) position in the plane frame, C[2] > 0
     roll_px: Array = field(default_factory=lambda: np.zeros(2))  # (2,) rolling shutter: see `rolled`
+    relief: HeightMap | None = None  # of the surface over the plane, which does not move with the view
 
     @property
     def H_plane_photo(self) -> Array:
-        """(3, 3): undistorted photo pixels to (u, v); the third coordinate is negative where the ray meets
-        the plane in front of the camera. The rolling shutter is undone in it, as if the lens had no
-        distortion: what the two have to do with each other is far below a pixel."""
+        """(3, 3): undistorted photo pixels to (u, v) of the flat plane; the third coordinate is negative
+        where the ray meets the plane in front of the camera. The rolling shutter is undone in it, as if the
+        lens had no distortion: what the two have to do with each other is far below a pixel."""
         height, (a, b) = self.camera.height_px, self.roll_px
         middle = (height - 1) / 2
         still = np.array(
@@ -43,11 +46,12 @@ class View:
         return np.stack([u * rays[2] - w * rays[0], v * rays[2] - w * rays[1], rays[2]])
 
     def to_plane(self, undistorted_px: npt.ArrayLike) -> Array:
-        """(N, 2) plane points of (N, 2) undistorted pixels; NaN where the ray misses the plane."""
+        """(N, 2) points (u, v) of the surface at (N, 2) undistorted pixels; NaN where the ray misses it."""
         px = np.asarray(undistorted_px, dtype=float)
         q = px @ self.H_plane_photo[:, :2].T + self.H_plane_photo[:, 2]
         depth = np.where(q[:, 2] < -1e-9, q[:, 2], np.nan)
-        return np.asarray(q[:, :2] / depth[:, None])
+        flat = np.asarray(q[:, :2] / depth[:, None])
+        return flat if self.relief is None else self.relief.met(flat, self.C)
 
     def to_undistorted(self, uv: npt.ArrayLike) -> Array:
         """(N, 2) undistorted pixels of (N, 2) plane points; NaN behind the camera."""
@@ -71,7 +75,7 @@ class View:
         return np.asarray(in_camera[:, :2] / z[:, None])
 
     def _in_camera(self, uv: Array) -> Array:
-        points = np.column_stack([uv, np.zeros(len(uv))])
+        points = np.column_stack([uv, np.zeros(len(uv)) if self.relief is None else self.relief.at(uv)])
         return np.asarray((points - self.C) @ self.R)
 
     @property

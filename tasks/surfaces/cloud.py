@@ -8,6 +8,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from schemas.problem import BadInput
+from schemas.surface import Surface
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -23,6 +24,8 @@ LARGEST_M = 10_000.0  # no structure is this long; a wrong unit or a stray point
 MOST_AWAY = 0.1  # of a station's normals; a grazing view turns a few
 LOOK_DEG = 1.5  # cells of a station's view,
 ONE_RANGE = 0.75  # of all points, in cells of one range; from a scanner's place ≥ 0.82, from others ≤ 0.64
+CHUNK = 4_000_000  # points of a table looked at together
+ALONG = 0.7  # cosine: a normal within 45° of a surface's own
 _NORMAL_NEIGHBOURS = 16  # of a point, when the file has no normals
 
 
@@ -54,7 +57,7 @@ def read_cloud(path: Path, item: str, stations_m: Floats) -> Cloud:
     Raises BadInput, naming `item`, for a file that is no such PLY, is cut short, has no finite point or
     extends over more than LARGEST_M.
     """
-    table = _read_ply(path, item)
+    table = read_table(path, item)
     points = np.column_stack([table[axis] for axis in "xyz"]).astype(np.float64)
     order = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))
     order = order[np.isfinite(points[order]).all(axis=1)]
@@ -132,7 +135,25 @@ def unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12))
 
 
-def _read_ply(path: Path, item: str) -> npt.NDArray[np.void]:
+def on_surface(table: npt.NDArray[np.void], surface: Surface) -> Floats:
+    """(N, 3) places, in the surface's frame, of the points whose normals are along its own, where it and
+    what lies beside it may be; a chunk of the cloud at a time."""
+    u0, v0, u1, v1 = surface.bounds_m
+    middle, reach = np.array([(u0 + u1) / 2, (v0 + v1) / 2]), np.hypot(u1 - u0, v1 - v0)
+    normal, found = np.asarray(surface.plane.normal), [np.zeros((0, 3))]
+    for start in range(0, len(table), CHUNK):
+        part = table[start : start + CHUNK]
+        uvw = surface.to_surface(np.column_stack([part[axis] for axis in "xyz"]))
+        near = (np.abs(uvw[:, :2] - middle).max(axis=1) < reach) & (np.abs(uvw[:, 2]) < 1.0)
+        if {"nx", "ny", "nz"} <= set(table.dtype.names or ()):
+            normals = np.column_stack([part[axis][near] for axis in ("nx", "ny", "nz")])
+            near[near] = np.abs(normals @ normal) > ALONG
+        found.append(uvw[near])
+    return np.concatenate(found)
+
+
+def read_table(path: Path, item: str) -> npt.NDArray[np.void]:
+    """The points of a binary PLY as they lie in the file, read where they are looked at. Raises BadInput."""
     remedy = "Make it again with `hairline register`, which writes binary little-endian PLY"
     with path.open("rb") as stream:
         lines: list[str] = []
@@ -159,10 +180,11 @@ def _read_ply(path: Path, item: str) -> npt.NDArray[np.void]:
                 fields.append((words[2], _PLY_TYPES[words[1]]))
         if not {"x", "y", "z"} <= {name for name, _ in fields}:
             raise BadInput(item, "the PLY's points have no x, y, z", remedy)
-        table = np.fromfile(stream, dtype=np.dtype(fields), count=count)
-    if len(table) < count:
-        raise BadInput(item, f"the PLY is cut short: {len(table)} of {count} points", remedy)
-    return table
+        start, point = stream.tell(), np.dtype(fields)
+    there = (path.stat().st_size - start) // point.itemsize
+    if there < count:
+        raise BadInput(item, f"the PLY is cut short: {there} of {count} points", remedy)
+    return np.memmap(path, point, "r", start, (count,)) if count else np.zeros(0, point)
 
 
 def _estimate_normals(points: Floats, stations_m: Floats) -> Floats:

@@ -10,8 +10,10 @@ from artifacts.page import Page
 from artifacts.picture import markdown_of
 from schemas.raster import Pixels
 from schemas.registered_model import RegisteredModel
+from schemas.relief import Relief
 from schemas.settings import SurfaceSettings
 from schemas.structure import Structure
+from schemas.surface import Surface
 from tasks.stage import progress, stage
 
 
@@ -66,3 +68,32 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
         utm_zone=model.utm_zone,
         left_out=model.left_out,
     )
+
+
+@stage()
+def measure_relief(model: RegisteredModel, surfaces: tuple[Surface, ...]) -> tuple[Relief, ...]:
+    """How surfaces stand out of their planes; none of those that are flat within the scans' noise."""
+    from tasks.surfaces.cloud import on_surface, read_table
+    from tasks.surfaces.relief import heights_of
+
+    shelf, reliefs = store.current(), []
+    table = read_table(shelf.path(model.cloud), "the registered model")
+    for done, surface in enumerate(surfaces, start=1):
+        found = heights_of(on_surface(table, surface), surface.bounds_m)
+        if found is not None:
+            with shelf.scratch() as folder:
+                np.save(folder / "heights.npy", found.w_m.astype(np.float32))
+                heights = shelf.put(folder / "heights.npy")
+            reliefs.append(
+                Relief(
+                    surface=surface.name,
+                    heights=heights,
+                    left_m=found.left_m,
+                    bottom_m=found.bottom_m,
+                    cell_m=found.cell_m,
+                    rms_m=float(np.sqrt(np.mean(found.w_m**2))),
+                    sigma_m=found.sigma_m,
+                )
+            )
+        progress(done / len(surfaces))
+    return tuple(reliefs)

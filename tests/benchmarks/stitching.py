@@ -23,15 +23,24 @@ from flows.console import out
 from schemas.mosaic import Mosaic, PhotoPlacement
 from schemas.photo import Photo
 from schemas.problem import BadInput
+from schemas.registered_model import RegisteredModel
+from schemas.relief import Relief
 from schemas.settings import StitchSettings
 from tasks.photos.task import features, ingest
+from tasks.stitching.relief import HeightMap
 from tasks.stitching.task import stitch
+from tasks.surfaces.task import measure_relief
 from tests.benchmarks.stitchers import NEEDS, PEERS, run_peer
 from tests.benchmarks.wall_photos import CASES, GSD_M, Case, WallPhotos, wall_photos
 
 Array = npt.NDArray[np.float64]
 
-BARS = {"plane": (0.15, 1.0), "k1": (0.3, None), "rolling": (0.5, None)}  # px RMS, px worst
+BARS = {
+    "plane": (0.15, 1.0),
+    "k1": (0.3, None),
+    "rolling": (0.5, None),
+    "relief-scan": (1.5, None),
+}  # px RMS, px worst
 STEP_P95, STEP_WORST = 0.5, 2.0  # px
 IN_99 = 9.2103  # d² of two numbers that holds 99 %
 
@@ -75,9 +84,29 @@ def run(photos: WallPhotos) -> Run:
             refused[path.name] = problem.what
     settings = StitchSettings()
     described = tuple(features.bare(photo, settings) for photo in taken)
-    mosaic = stitch.bare("wall", photos.face.surface(), tuple(taken), described, settings)
+    surface, relief = photos.face.surface(), _relief(photos)
+    mosaic = stitch.bare("wall", surface, tuple(taken), described, settings, None, relief)
     cpu_s = time.process_time() - began
     return Run(photos, mosaic, refused, cpu_s, seam_steps_px(mosaic, photos))
+
+
+def _relief(photos: WallPhotos) -> Relief | None:
+    """As the stage measures it in a registered model."""
+    if photos.scan_m is None:
+        return None
+    surface = photos.face.surface()
+    points = photos.scan_m.astype("<f4")
+    normals = np.tile(np.asarray(surface.plane.normal, "<f4"), (len(points), 1))
+    header = "ply\nformat binary_little_endian 1.0\n" + f"element vertex {len(points)}\n"
+    header += "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "wall.ply"
+        path.write_bytes((header + "end_header\n").encode() + np.hstack([points, normals]).tobytes())
+        low, high = (tuple(float(x) for x in p) for p in (points.min(axis=0), points.max(axis=0)))
+        known: dict[str, Any] = {"cloud": store.current().put(path), "points": len(points)}
+        model = RegisteredModel(**known, stations=(), min_m=low, max_m=high)
+    (relief,) = measure_relief.bare(model, (surface,))
+    return relief
 
 
 def seam_steps_px(mosaic: Mosaic, photos: WallPhotos) -> Array:
@@ -93,10 +122,7 @@ def seam_steps_px(mosaic: Mosaic, photos: WallPhotos) -> Array:
         if not {mosaic.photos[i].name, mosaic.photos[j].name} <= photos.truth.keys():
             continue
         at = seams[(pairs == [i, j]).all(axis=1)][:, [1, 0]].astype(float)
-        shown = [
-            photos.truth[mosaic.photos[k].name].see(_in_photo(mosaic.photos[k], mosaic.placements[k], at))
-            for k in (i, j)
-        ]
+        shown = [photos.truth[mosaic.photos[k].name].see(_in_photo(mosaic, k, at)) for k in (i, j)]
         steps.append(np.linalg.norm(shown[0] - shown[1], axis=1) / GSD_M)
     return np.concatenate(steps)
 
@@ -137,12 +163,27 @@ def _on_plane(mosaic: Mosaic, photo: Photo, placement: PhotoPlacement, px: Array
     flat = ideal * camera.focal_px + camera.principal_px
     q = np.column_stack([flat, np.ones(len(flat))]) @ np.array(placement.H_mosaic_photo).T
     xy = q[:, :2] / q[:, 2:]
-    return np.asarray(xy * (mosaic.gsd_mm_px or 0.0) / 1000.0 * [1, -1] + mosaic.origin_uv_m)
+    flat = np.asarray(xy * (mosaic.gsd_mm_px or 0.0) / 1000.0 * [1, -1] + mosaic.origin_uv_m)
+    heights = _heights(mosaic)
+    return flat if heights is None else heights.met(flat, np.asarray(placement.camera_uvw_m))
 
 
-def _in_photo(photo: Photo, placement: PhotoPlacement, xy: Array) -> Array:
-    """(N, 2) pixels of the photo as taken that the mosaic shows at (N, 2) of its own."""
-    camera = photo.camera
+def _heights(mosaic: Mosaic) -> HeightMap | None:
+    of = mosaic.relief
+    if of is None:
+        return None
+    w = np.load(store.current().path(of.heights)).astype(float)
+    return HeightMap(w, of.left_m, of.bottom_m, of.cell_m)
+
+
+def _in_photo(mosaic: Mosaic, k: int, xy: Array) -> Array:
+    """(N, 2) pixels of the k-th photo as taken that the mosaic shows at (N, 2) of its own."""
+    placement, camera, heights = mosaic.placements[k], mosaic.photos[k].camera, _heights(mosaic)
+    if heights is not None:  # where the ray through what stands over the plane meets the plane
+        gsd_m, C = (mosaic.gsd_mm_px or 0.0) / 1000.0, np.asarray(placement.camera_uvw_m)
+        uv = xy * gsd_m * [1, -1] + mosaic.origin_uv_m
+        share = (heights.at(uv) / C[2])[:, None]
+        xy = ((uv - share * C[:2]) / (1 - share) - mosaic.origin_uv_m) / gsd_m * [1, -1]
     q = np.linalg.solve(np.array(placement.H_mosaic_photo), np.column_stack([xy, np.ones(len(xy))]).T).T
     ideal = (q[:, :2] / q[:, 2:] - camera.principal_px) / camera.focal_px
     return np.asarray(camera.distort(ideal) * camera.focal_px + camera.principal_px)

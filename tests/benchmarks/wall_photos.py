@@ -46,6 +46,7 @@ class Case:
     readout_s: float = 0.0
     speed_m_s: float = 0.0
     relief_m: float = 0.0  # from the lowest to the highest point
+    scanned: bool = False  # the relief is known from a laser scan
     surface: str = "concrete"  # "faint", "tiles"
     position_sigma_m: float = 0.1
     gain: float = 0.15  # exposures differ by this, either way
@@ -58,6 +59,7 @@ CASES = (
     Case("k1", "k1 = −0.05 unknown", k1=-0.05),
     Case("rolling", "rolling shutter 30 ms at 0.1 m/s", readout_s=0.03, speed_m_s=0.1),
     Case("relief", "3 cm of relief, no scan", relief_m=0.03),
+    Case("relief-scan", "3 cm of relief, scanned", relief_m=0.03, scanned=True),
     Case("tiles", "repeated texture", surface="tiles"),
     Case("faint", "low contrast", surface="faint"),
     Case("lost", "shuffled names, photos lost, positions off by 1.5 m", position_sigma_m=1.5, lost=4),
@@ -83,6 +85,7 @@ class WallPhotos:
     poses: dict[str, CameraPose]  # as reported, by file name
     position_sigma_m: float
     truth: dict[str, Shown]  # of the photos that belong to the wall
+    scan_m: Array | None  # (N, 3) world points, as a registered model has them
     intruders: tuple[str, ...]
 
 
@@ -128,7 +131,8 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
     intruders = tuple(n for n in json.loads(said.read_text()) if n not in truth)
     for name in intruders:
         poses[name] = poses[names[INTRUDED[name]]]
-    return WallPhotos(folder, nominal, face, poses, case.position_sigma_m, truth, intruders)
+    scan = _scanned(relief, face, seed) if case.scanned else None
+    return WallPhotos(folder, nominal, face, poses, case.position_sigma_m, truth, scan, intruders)
 
 
 INTRUDED = {"other-1.jpg": 1, "other-2.jpg": 2, "other-3.jpg": 3, "mirrored.jpg": 4, "cut.jpg": 5}
@@ -227,6 +231,16 @@ def _relief(case: Case, face: Face, seed: int) -> npt.NDArray[np.float32]:
     return np.asarray(
         (smooth - smooth.min()) / np.ptp(smooth) * case.relief_m - case.relief_m / 2, np.float32
     )
+
+
+def _scanned(relief: npt.NDArray[np.float32], face: Face, seed: int) -> Array:
+    """Points 2 cm apart, as registration merges them, 3 mm off in range."""
+    rng = np.random.default_rng([seed, 11])
+    u, v = np.meshgrid(np.arange(0, face.width_m, 0.02), np.arange(0, face.height_m, 0.02))
+    uv = np.column_stack([u.ravel(), v.ravel()]) + rng.uniform(-0.01, 0.01, (u.size, 2))
+    height = map_coordinates(relief, (uv / RELIEF_TEXEL_M).T[::-1], order=1, mode="nearest")
+    off = height + rng.normal(0.0, 0.003, len(uv))
+    return np.asarray(face.to_world(uv) + off[:, None] * face.normal)
 
 
 def _grid(camera: Camera) -> Array:
