@@ -1,4 +1,5 @@
-"""How well each place of a mosaic is known: the stated uncertainty of the photo that its pixels come from."""
+"""How well each place of a mosaic is known: the stated uncertainty of the photo that its pixels come from,
+and what heights that nobody knows move them by, the more the more obliquely the photo looks: x·δh/Z."""
 
 import io
 from contextlib import closing
@@ -22,6 +23,8 @@ BAND_PX = 1024
 STATED_ALONE = "#bdbdbd"  # placed by its position alone: no match bounds it
 STEPS = 254  # of the colour scale
 
+Array = npt.NDArray[np.float64]
+
 
 def sigma_mm(placement: PhotoPlacement) -> float | None:
     """1σ of where the photo's middle lies among the others, along the worst direction."""
@@ -32,24 +35,23 @@ def sigma_mm(placement: PhotoPlacement) -> float | None:
 
 def uncertainty_map(mosaic: Mosaic, open_file: OpenFile) -> Markup | None:
     """An SVG; None where no uncertainty is stated (no scale, or no match)."""
-    sigmas = [sigma_mm(p) for p in mosaic.placements]
-    known = [s for s in sigmas if s is not None]
-    if not known:
+    if all(p.covariance_mm2 is None for p in mosaic.placements):
         return None
-    low, high = min(known), max(known)
-    levels = np.zeros(len(sigmas) + 1, np.uint8)  # 0: blank, 1: stated alone, 2…: the scale
-    for k, sigma in enumerate(sigmas, start=1):
-        levels[k] = 1 if sigma is None else 2 + round((STEPS - 1) * (sigma - low) / max(high - low, 1e-12))
-    if high - low < 1e-9:
-        levels[levels > 1] = 2 + STEPS // 2
     scale = min(WIDTH / mosaic.width_px, HEIGHT / mosaic.height_px)
     width, height = mosaic.width_px * scale, mosaic.height_px * scale
     size = (min(mosaic.width_px, max(1, round(width))), min(mosaic.height_px, max(1, round(height))))
+    sigmas, blank = _sigmas_mm(mosaic, open_file, size)
+    if not np.isfinite(sigmas).any():
+        return None
+    low, high = float(np.nanmin(sigmas)), float(np.nanmax(sigmas))
+    share = np.nan_to_num((sigmas - low) / (high - low)) if high - low > 1e-9 else np.full_like(sigmas, 0.5)
+    levels = np.where(np.isfinite(sigmas), 2 + np.rint((STEPS - 1) * share), 1).astype(np.uint8)
+    levels[blank] = 0  # 1: stated alone, 2…: the scale
     root = svg.drawing(
         max(width, 560.0), height + LEGEND, f"Position uncertainty over the mosaic of {mosaic.name}"
     )
     root.set("style", f"max-width:{svg.number(max(width, 560.0))}px")
-    picture = _png(levels[np.minimum(_sources(mosaic, open_file, size), len(sigmas))])
+    picture = _png(levels)
     svg.add(root, "image", href=picture, x=0, y=0, width=width, height=height, preserveAspectRatio="none")
     frame = {"fill": "none", "stroke": palette.FAINT, "stroke_width": 0.8}
     svg.add(root, "rect", x=0, y=0, width=width, height=height, **frame)
@@ -62,6 +64,25 @@ def uncertainty_map(mosaic: Mosaic, open_file: OpenFile) -> Markup | None:
         svg.add(root, "rect", x=180 + BAR, y=y - 8, width=11, height=9, rx=2, fill=STATED_ALONE)
         svg.write(root, "placed by position alone", x=195 + BAR, y=y, font_size=11.5, fill=palette.INK)
     return svg.text_of(root)
+
+
+def _sigmas_mm(
+    mosaic: Mosaic, open_file: OpenFile, size: tuple[int, int]
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """(height, width) 1σ along the worst direction, NaN where none is stated; and what is blank."""
+    source = np.minimum(_sources(mosaic, open_file, size), len(mosaic.placements))
+    own = [np.nan if (sigma := sigma_mm(p)) is None else sigma for p in mosaic.placements]
+    sigmas = np.array([np.nan, *own])[source]
+    if mosaic.height_sigma_m and mosaic.gsd_mm_px is not None:
+        x = (np.arange(size[0]) + 0.5) * mosaic.width_px / size[0] * mosaic.gsd_mm_px / 1000.0
+        y = (np.arange(size[1]) + 0.5) * mosaic.height_px / size[1] * mosaic.gsd_mm_px / 1000.0
+        u, v = np.meshgrid(mosaic.origin_uv_m[0] + x, mosaic.origin_uv_m[1] - y)
+        nowhere = (np.nan, np.nan, np.nan)
+        at = [nowhere, *(p.camera_uvw_m or nowhere for p in mosaic.placements)]
+        cu, cv, cw = np.array(at)[source].transpose(2, 0, 1)
+        leaning = np.hypot(u - cu, v - cv) / cw
+        sigmas = np.hypot(sigmas, np.nan_to_num(leaning) * 1000.0 * mosaic.height_sigma_m)
+    return sigmas, source == 0
 
 
 def _sources(mosaic: Mosaic, open_file: OpenFile, size: tuple[int, int]) -> npt.NDArray[np.int64]:

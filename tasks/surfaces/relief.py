@@ -13,6 +13,7 @@ COARSE_M = 0.05  # cells that tell how dense the points are
 SPACINGS = 2.0  # a cell's side, in mean distances of points: some four points a cell
 SMALLEST_M, LARGEST_M = 0.02, 0.5  # of a cell
 FEWEST = 100  # points
+STANDS_OUT_M = 0.02  # of the median of 5 × 5 cells, beyond noise: no skin of a wall
 MAD = 1.4826  # σ of the median absolute deviation; and the median of n points is 1.25 σ/√n
 MEDIAN = 1.2533
 
@@ -31,8 +32,8 @@ class Heights:
 def heights_of(uvw_m: Floats, bounds_m: tuple[float, float, float, float]) -> Heights | None:
     """From (N, 3) points in the surface's frame; None where they tell of no relief beyond their noise.
 
-    Each cell has the median of its points, so that a cable before the wall or a stray echo moves nothing;
-    cells without points are filled from around them."""
+    Each cell has the median of its points; cells that stand out from all around them (a cable before the
+    wall) and those without points are filled from around."""
     low, high = np.array(bounds_m[:2]) - AROUND_M, np.array(bounds_m[2:]) + AROUND_M
     near = (np.abs(uvw_m[:, 2]) < REACH_M) & ((uvw_m[:, :2] > low) & (uvw_m[:, :2] < high)).all(axis=1)
     points = uvw_m[near]
@@ -48,10 +49,11 @@ def heights_of(uvw_m: Floats, bounds_m: tuple[float, float, float, float]) -> He
     signal = float(np.var(median)) - sigma**2
     if signal <= sigma**2:
         return None
-    w, known = np.zeros(rows * columns), np.zeros(rows * columns)
-    w[index], known[index] = median, 1.0
-    filled = _filled(w.reshape(rows, columns), known.reshape(rows, columns))
-    return Heights(filled, float(low[0]), float(low[1]), cell, sigma)
+    w, known = np.zeros((rows, columns)), np.zeros((rows, columns))
+    w.flat[index], known.flat[index] = median, 1.0
+    around = cv2.medianBlur(_filled(w, known).astype(np.float32), 5)
+    known[np.abs(w - around) > STANDS_OUT_M + 5.0 * sigma] = 0.0
+    return Heights(_filled(w, known), float(low[0]), float(low[1]), cell, sigma)
 
 
 def _medians(cell: Indices, w: Floats) -> tuple[Indices, Floats, Indices, float]:

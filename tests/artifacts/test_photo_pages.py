@@ -105,6 +105,19 @@ def test_the_map_shows_the_uncertainty_of_the_photo_under_each_place(shelf: Shel
     assert "#{:02x}{:02x}{:02x}".format(*pixels[-3, width // 2]) == STATED_ALONE
 
 
+def test_unknown_heights_count_the_more_the_more_obliquely_a_photo_looks(
+    shelf: Shelf, mosaic: Mosaic
+) -> None:
+    """Cameras 1000 px before the middle: in the upper corners, 500 px aside, 1 cm of height moves 5 mm."""
+    gsd_m, (u, v) = (mosaic.gsd_mm_px or 0.0) / 1000.0, mosaic.origin_uv_m
+    at = (u + 400 * gsd_m, v - 300 * gsd_m, 1000 * gsd_m)
+    seen = tuple(p.model_copy(update={"camera_uvw_m": at}) for p in mosaic.placements)
+    update = {"placements": seen, "height_sigma_m": 0.01}
+    drawn = str(uncertainty_map(mosaic.model_copy(update=update), shelf.open_file))
+    assert "5 mm (1σ)" in drawn
+    assert "0.2 mm" in drawn
+
+
 def test_without_a_scale_no_uncertainty_is_drawn(shelf: Shelf, mosaic: Mosaic) -> None:
     bare = tuple(p.model_copy(update={"covariance_mm2": None}) for p in mosaic.placements)
     assert uncertainty_map(mosaic.model_copy(update={"placements": bare}), shelf.open_file) is None

@@ -29,7 +29,13 @@ def flown(seed: int, roll_px: float) -> list[View]:
 
 
 def adjusted(true: list[View], noise_px: float, seed: int) -> Adjusted:
-    """From positions off by 5 cm and level cameras without rolling shutter and distortion."""
+    said, seen, priors = observed(true, noise_px, seed)
+    return adjust(said, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None)
+
+
+def observed(true: list[View], noise_px: float, seed: int) -> tuple[list[View], Observations, list[Prior]]:
+    """Positions off by 5 cm and level cameras without rolling shutter, distortion and relief; what the true
+    ones see; and what is known of them."""
     rng = np.random.default_rng([seed, 1])
     X = rng.uniform((-1.5, -1.2), (5.5, 3.3), (POINTS, 2))
     photo, track, xy = [], [], []
@@ -43,11 +49,9 @@ def adjusted(true: list[View], noise_px: float, seed: int) -> Adjusted:
     plain = CAMERA.model_copy(update={"k1": 0.0})
     seen = Observations(np.concatenate(photo)[order], np.concatenate(track)[order], np.concatenate(xy)[order])
     every = Observations(seen.photo, seen.track, seen.xy).where(np.ones(len(order), bool))
-    said = [
-        replace(v, camera=plain, R=FACING, C=v.C + rng.normal(0, 0.05, 3), roll_px=np.zeros(2)) for v in true
-    ]
+    said = [View(plain, FACING, v.C + rng.normal(0, 0.05, 3)) for v in true]
     priors = [Prior(v, np.full(3, 0.05), np.radians(np.full(3, 2.0))) for v in said]
-    return adjust(said, every, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None)
+    return said, every, priors
 
 
 def off_m(found: Adjusted, true: list[View], px: Array) -> Array:

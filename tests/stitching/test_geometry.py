@@ -12,6 +12,7 @@ from schemas.problem import BadInput
 from tasks.stitching.bundle import State, build_bundle, linearise, points, residuals
 from tasks.stitching.canvas import Canvas, lay_out
 from tasks.stitching.prior import Prior
+from tasks.stitching.relief import HeightMap
 from tasks.stitching.seams import photo_map
 from tasks.stitching.skyline import solve_positive
 from tasks.stitching.tracks import Observations
@@ -21,6 +22,8 @@ CAMERA = Camera(width_px=800, height_px=600, focal_px=1000.0, k1=-0.08, k2=0.02,
 FISHEYE = Camera(
     width_px=800, height_px=600, focal_px=600.0, lens="fisheye", k1=-0.02, k2=0.004, k3=0.001, k4=-0.0005
 )
+WAVES = np.mgrid[0:61, 0:81] / 3.0
+RELIEF = HeightMap(0.01 * np.sin(WAVES[0]) * np.cos(WAVES[1]), -3.0, -5.0, 0.1)  # 2 cm, waves of 2 m
 angles = st.floats(-0.5, 0.5)
 
 
@@ -32,6 +35,8 @@ def view(a: float = 0.1, b: float = -0.2, c: float = 0.3, camera: Camera = CAMER
 def test_plane_and_photo_are_inverse(a: float, b: float, c: float, x: float, y: float) -> None:
     one = view(a, b, c)
     np.testing.assert_allclose(one.to_undistorted(one.to_plane([[x, y]])), [[x, y]], atol=1e-6)
+    raised = replace(one, relief=RELIEF)
+    np.testing.assert_allclose(raised.to_undistorted(raised.to_plane([[x, y]])), [[x, y]], atol=1e-3)
 
 
 @given(a=angles, b=angles, c=angles)
@@ -86,10 +91,12 @@ def test_skyline_refuses_what_is_not_positive() -> None:
         solve_positive(np.diag([1.0, -1.0]), np.ones(2))
 
 
+@pytest.mark.parametrize("relief", [None, RELIEF], ids=["flat", "relief"])
 @pytest.mark.parametrize("camera", [CAMERA, FISHEYE], ids=["brown", "fisheye"])
-def test_derivatives_of_the_bundle(camera: Camera) -> None:
+def test_derivatives_of_the_bundle(camera: Camera, relief: HeightMap | None) -> None:
     rng = np.random.default_rng(0)
     views = [view(0.1, 0.05, 0.0, camera), view(-0.1, 0.1, 0.2, camera)]
+    views = [replace(v, relief=relief) for v in views]
     photo = np.repeat([0, 1], 20)
     track = np.tile(np.arange(20), 2)
     order = np.argsort(track, kind="stable")

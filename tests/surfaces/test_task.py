@@ -12,7 +12,7 @@ from schemas.problem import BadInput
 from schemas.registered_model import RegisteredModel, Station
 from schemas.settings import SurfaceSettings
 from schemas.structure import Structure
-from tasks.surfaces.task import extract, pages
+from tasks.surfaces.task import extract, measure_relief, pages
 from tests.development_data import development_data
 from tests.surfaces.scanner import Box, scan
 from tests.surfaces.test_cloud import write_ply
@@ -59,6 +59,23 @@ def test_pages_show_a_picture_and_a_table(wall: RegisteredModel) -> None:
     picture, table = pages({}, extract.bare(wall, SurfaceSettings()))
     assert "data:image/jpeg;base64," in (picture.markdown or "")
     assert [row["surface"] for row in table.table] == ["wall-south-01"]
+
+
+def test_a_wall_that_bulges_has_a_relief_and_a_flat_one_none(
+    wall: RegisteredModel, shelf: store.Store, tmp_path: Path
+) -> None:
+    flat = extract.bare(wall, SurfaceSettings()).surfaces
+    assert measure_relief.bare(wall, flat) == ()
+    grid = np.stack(np.meshgrid(np.arange(-2, 2, 0.02), np.arange(-1, 2, 0.02)), axis=-1).reshape(-1, 2)
+    bulge_m = 0.03 * np.exp(-((grid - [0.0, 0.5]) ** 2).sum(axis=1) / 0.5**2)
+    points = np.column_stack([grid[:, 0], 5.0 - bulge_m, grid[:, 1]])  # towards the scanner
+    (relief,) = measure_relief.bare(model_of(points, tmp_path / "bulge.ply"), flat)
+    w_m = np.load(shelf.path(relief.heights))
+    assert relief.surface == "wall-south-01"
+    assert w_m.max() - np.median(w_m) == pytest.approx(0.03, abs=0.003)
+    r, c = np.unravel_index(int(np.argmax(w_m)), w_m.shape)
+    place = flat[0].to_world([(relief.left_m + c * relief.cell_m, relief.bottom_m + r * relief.cell_m)])[0]
+    np.testing.assert_allclose(place[[0, 2]], [0.0, 0.5], atol=2 * relief.cell_m)
 
 
 def test_a_model_without_surfaces_names_its_stations(tmp_path: Path) -> None:
