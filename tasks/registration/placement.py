@@ -23,7 +23,7 @@ MOST_SEEN_THROUGH = 0.13  # see visibility.contradiction
 MOST_AS_STATED = 0.3  # where it came to stand as it was measured: traffic between scans, not a wrong place
 SURELY_RIGHT = 0.03  # no better proposal is looked for
 PROPOSALS = 4  # of each kind that are tried
-MOTIONS = 40  # by plan or features, before the least contradictory are chosen
+MOTIONS = 150  # by plan or features, before the least contradictory are chosen
 SEARCH_POINTS = 1500
 REACH = 4.0  # coarse voxels
 
