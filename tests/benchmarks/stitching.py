@@ -41,6 +41,7 @@ BARS = {
     "rolling": (0.5, None),
     "relief-scan": (1.5, None),
 }  # px RMS, px worst
+GROWTH_GRIDS = ((6, 5), (10, 9), (20, 15))  # columns and rows
 STEP_P95, STEP_WORST = 0.5, 2.0  # px
 IN_99 = 9.2103  # d² of two numbers that holds 99 %
 
@@ -285,6 +286,26 @@ def peer_rows(photos: WallPhotos, ours: Run, data: str) -> list[dict[str, Any]]:
     return rows
 
 
+def growth_rows(megapixels: float, cache: Path) -> list[dict[str, Any]]:
+    """CPU time of larger and larger sets with poses, of the plane."""
+    (case,) = (case for case in CASES if case.name == "plane")
+    counts, times = [], []
+    for columns, rows in GROWTH_GRIDS:
+        photos = wall_photos(case, columns, rows, megapixels, 1, cache)
+        with store.temporary():
+            done = run(photos)
+        counts.append(columns * rows)
+        times.append(done.cpu_s)
+        out.print(f"{counts[-1]} photos: {times[-1]:.1f} CPU s")
+    data = f"simulated, {counts[0]} to {counts[-1]} photos of {megapixels:g} MP with poses"
+    exponent = float(np.polyfit(np.log(counts), np.log(times), 1)[0])
+    known: dict[str, Any] = {"data": data, "seed": 1}
+    return [
+        row("growth of CPU time with photos", exponent, "exponent", most=1.15, **known),
+        row(f"CPU time a photo, of {counts[-1]}", times[-1] / counts[-1], "s", **known),
+    ]
+
+
 def _round(value: float) -> float | None:
     return round(value, 2) if np.isfinite(value) else None
 
@@ -297,12 +318,17 @@ def main() -> None:
     asked.add_argument("--cache", type=Path, default=Path("build/bench/photos"))
     asked.add_argument("--grid", type=int, nargs=2, default=(4, 3))
     asked.add_argument("--no-peers", action="store_true")
+    asked.add_argument("--growth", action="store_true", help="CPU time from 30 to 300 photos")
     asked.add_argument("--megapixels", type=float, default=2.0)
     given = asked.parse_args()
     columns, rows = (6, 5) if given.full else given.grid
     megapixels, seeds = (8.0, 5) if given.full else (given.megapixels, given.seeds)
     size = f"simulated, {columns * rows} × {megapixels:g} MP"
     table: list[dict[str, Any]] = []
+    if given.growth:
+        table += growth_rows(megapixels, given.cache)
+        for line in table:
+            _tell(line)
     for case in CASES:
         if case.name not in given.cases:
             continue
@@ -316,18 +342,22 @@ def main() -> None:
             lines += peer_rows(runs[0].photos, runs[0], size)
         for line in lines:
             table.append(line)
-            if line["peer"]:
-                theirs = f"{line['peer']}: {line['peer_value']}"
-                out.print(f"{line['what']:44} {line['value']:9} {line['unit']:7} {theirs}")
-                continue
-            mark = {True: "holds", False: "MISSED", None: ""}[line["holds"]]
-            out.print(f"{line['what']:68} {line['value']:9} {line['unit']:7} {line['bar'] or '':15} {mark}")
+            _tell(line)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     table.append(row("peak memory", peak, "GiB", most=4.0, data=size))
     path = Path("build/bench/stitching.json")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n")
     out.print(f"\n{path}")
+
+
+def _tell(line: dict[str, Any]) -> None:
+    if line["peer"]:
+        theirs = f"{line['peer']}: {line['peer_value']}"
+        out.print(f"{line['what']:44} {line['value']:9} {line['unit']:7} {theirs}")
+        return
+    mark = {True: "holds", False: "MISSED", None: ""}[line["holds"]]
+    out.print(f"{line['what']:68} {line['value']:9} {line['unit']:7} {line['bar'] or '':15} {mark}")
 
 
 if __name__ == "__main__":
