@@ -21,6 +21,7 @@ from tasks.registration.yaw_search import DistanceField, turns, turns_about
 LEAST_STABILITY = 0.002  # of the overlap's normals; a floor alone has less
 MOST_SEEN_THROUGH = 0.13  # see visibility.contradiction
 MOST_AS_STATED = 0.3  # where it came to stand as it was measured: traffic between scans, not a wrong place
+STATED_M = 2.0  # around a measured position a station is looked for, and found there as it was measured
 SURELY_RIGHT = 0.03  # no better proposal is looked for
 PROPOSALS = 4  # of each kind that are tried
 MOTIONS = 150  # by plan or features, before the least contradictory are chosen
@@ -84,7 +85,8 @@ class _Growing:
         best: tuple[float, Array] | None = None
         sample = balanced_sample(self.shapes[candidate].cloud, SEARCH_POINTS, 0)
         for T, stated in self._proposals(candidate):
-            if best is not None and not stated and self._as_stated(candidate, best[1]):
+            settled = best is not None and best[0] < MOST_SEEN_THROUGH and self._as_stated(candidate, best[1])
+            if settled and not stated:
                 break
             aligned = align(sample, self.union, T, self.reach_m, iterations=10)
             if aligned is None:
@@ -111,7 +113,7 @@ class _Growing:
         if site.position_m is None or site.scanner_m is None or T_frame_world is None:
             return False
         apart_m = transform(T, site.scanner_m[None])[0] - transform(T_frame_world, site.position_m[None])[0]
-        return bool(np.linalg.norm(apart_m) < world_frame.AGREE_M)
+        return bool(np.linalg.norm(apart_m) < STATED_M)
 
     def _proposals(self, candidate: int) -> Iterator[tuple[Array, bool]]:
         """T_frame_local, and whether it stands on a statement."""
@@ -135,7 +137,7 @@ class _Growing:
         measured = [i for i in self.T if self.sites[i].position_m is not None]
         if T_frame_world is not None:
             position_m = transform(T_frame_world, site.position_m[None])[0]
-            for _, T in turns(self.field, sample_m.astype(np.float64), position_m, 2.0, PROPOSALS):
+            for _, T in turns(self.field, sample_m.astype(np.float64), position_m, STATED_M, PROPOSALS):
                 yield T @ to_scanner
         elif measured:
             anchor = self.sites[measured[0]]
