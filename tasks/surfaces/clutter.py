@@ -7,6 +7,7 @@ other planes do not count: the other face of a thin plate may be that near.
 import numpy as np
 import shapely
 
+from tasks.surfaces.boxes import Box, Sorted
 from tasks.surfaces.cloud import Floats, Mask
 from tasks.surfaces.frame import Frame
 from tasks.surfaces.patches import Patch
@@ -22,10 +23,12 @@ def in_clutter(patches: list[Patch], points_m: Floats, distance_m: float) -> lis
     free: Mask = np.ones(len(points_m), dtype=bool)
     for patch in patches:
         free[patch.points] = False
-    left_m = points_m[free]
+    left = Sorted(points_m[free])
     found = []
     for patch in patches:
-        uvw_m = Frame.of(patch.surface).uvw_m(left_m)
+        frame = Frame.of(patch.surface)
+        reach = Box.of(frame.world_m(np.asarray(patch.surface.outline_m))).grown(3 * distance_m)
+        uvw_m = frame.uvw_m(left.points_m[left.at(reach)])
         height_m = np.abs(uvw_m[:, 2])
         beyond = uvw_m[(height_m > distance_m) & (height_m <= 3 * distance_m)]
         outline = shapely.Polygon(patch.surface.outline_m, patch.surface.holes_m)

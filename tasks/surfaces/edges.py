@@ -7,6 +7,7 @@ edge point goes to the nearest plane that its neighbours lie on.
 
 import numpy as np
 
+from tasks.surfaces.boxes import Box, Sorted
 from tasks.surfaces.cloud import Cloud, Indices, Mask
 from tasks.surfaces.frame import Frame
 from tasks.surfaces.plane_cells import beside
@@ -19,12 +20,16 @@ MOST_SHARED = 0.5  # of a plane's points on larger planes
 def without_slivers(supports: list[Support], cloud: Cloud, distance_m: float) -> list[Support]:
     """Supports, largest first, without those whose points mostly lie on larger ones they touch."""
     kept: list[Support] = []
+    reaches: list[Box] = []
     for support in sorted(supports, key=lambda support: -len(support.points)):
         shared = np.zeros(len(support.points), dtype=bool)
-        for larger in kept:
-            shared |= _near(cloud, support.points, larger, distance_m)
+        own = Box.of(cloud.points[support.points])
+        for larger, reach in zip(kept, reaches, strict=True):
+            if reach.meets(own):
+                shared |= _near(cloud, support.points, larger, distance_m)
         if shared.mean() <= MOST_SHARED:
             kept.append(support)
+            reaches.append(own.grown(_farthest_m(distance_m)))
     return kept
 
 
@@ -35,10 +40,12 @@ def with_edge_points(supports: list[Support], cloud: Cloud, distance_m: float) -
     for support in supports:
         free[support.points] = False
     left = np.flatnonzero(free)
+    around = Sorted(cloud.points[left])
     nearest_m = np.full(len(left), np.inf)
     owner = np.full(len(left), -1)
     for number, support in enumerate(supports):
-        near = np.flatnonzero(_near(cloud, left, support, distance_m))
+        near = around.inside(Box.of(cloud.points[support.points]).grown(_farthest_m(distance_m)))
+        near = near[_near(cloud, left[near], support, distance_m)]
         moved = cloud.points[left[near]] - support.centroid
         height_m = np.abs(np.einsum("ni,i->n", moved, support.normal))
         closer = height_m < nearest_m[near]
@@ -47,6 +54,11 @@ def with_edge_points(supports: list[Support], cloud: Cloud, distance_m: float) -
         np.sort(np.concatenate([support.points, left[owner == number]]))
         for number, support in enumerate(supports)
     ]
+
+
+def _farthest_m(distance_m: float) -> float:
+    """That a point near a support may lie from it: two cells along u and along v, and off the plane."""
+    return float(np.hypot(2 * np.sqrt(2) * REACH_M, distance_m))
 
 
 def _near(cloud: Cloud, chosen: Indices, support: Support, distance_m: float) -> Mask:

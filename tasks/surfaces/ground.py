@@ -6,6 +6,7 @@ from itertools import compress
 import numpy as np
 
 from schemas.surface import Surface
+from tasks.surfaces.boxes import Box, Sorted
 from tasks.surfaces.cloud import Floats
 from tasks.surfaces.frame import Frame
 from tasks.surfaces.naming import LEVEL_DEG
@@ -22,7 +23,8 @@ def is_ground(surfaces: Sequence[Surface], points_m: Floats) -> list[bool]:
 
     A deck has the river or its own soffit below, a table the floor beside it. points_m: (N, 3).
     """
-    return [_upward(s) and _lower_share(s, points_m) < LOWER_SHARE for s in surfaces]
+    around = Sorted(points_m)
+    return [_upward(s) and _lower_share(s, around) < LOWER_SHARE for s in surfaces]
 
 
 def without_scraps(found: Sequence[Patch], ground: Sequence[bool]) -> tuple[list[Patch], list[bool]]:
@@ -39,8 +41,12 @@ def _upward(surface: Surface) -> bool:
     return surface.plane.normal[2] > float(np.cos(np.radians(LEVEL_DEG)))
 
 
-def _lower_share(surface: Surface, points_m: Floats) -> float:
-    uvw_m = Frame.of(surface).uvw_m(points_m)
+def _lower_share(surface: Surface, around: Sorted) -> float:
+    frame = Frame.of(surface)
+    deepest_m = float(np.ptp(around.points_m[:, 2]))
+    aside_m = np.sqrt(2) * AROUND_M + deepest_m * np.tan(np.radians(LEVEL_DEG))  # not quite level
+    column = Box.of(frame.world_m(np.asarray(surface.outline_m))).grown(np.array([aside_m, aside_m, np.inf]))
+    uvw_m = frame.uvw_m(around.points_m[around.at(column)])
     u_min, v_min, u_max, v_max = surface.bounds_m
     near = (uvw_m[:, 0] > u_min - AROUND_M) & (uvw_m[:, 0] < u_max + AROUND_M)
     near &= (uvw_m[:, 1] > v_min - AROUND_M) & (uvw_m[:, 1] < v_max + AROUND_M)

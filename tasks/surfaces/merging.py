@@ -11,6 +11,7 @@ scanners' places are not known, some normals may point the wrong way: then the s
 
 import numpy as np
 
+from tasks.surfaces.boxes import Box
 from tasks.surfaces.cloud import Cloud
 from tasks.surfaces.frame import Frame
 from tasks.surfaces.plane_cells import beside
@@ -27,16 +28,23 @@ def merge_planes(supports: list[Support], cloud: Cloud, distance_m: float, reach
     """Supports in order of size, those that are one surface joined. cloud: what they index; reach_m: how far
     apart their points may be and still touch."""
     pending = sorted(supports, key=lambda support: -len(support.points))
+    boxes = [Box.of(cloud.points[support.points]) for support in pending]
+    farthest_m = float(np.hypot(2 * np.sqrt(2) * reach_m, 4 * distance_m))
     merged: list[Support] = []
     while pending:
         whole, *pending = pending
+        del boxes[0]
         again = True
         while again:
             again = False
+            reach = Box.of(cloud.points[whole.points]).grown(farthest_m)
             for number, other in enumerate(pending):
+                if not reach.meets(boxes[number]):
+                    continue
                 union = _union(whole, other, cloud, distance_m, reach_m)
                 if union is not None:
                     whole, again = union, True
+                    del boxes[number]
                     del pending[number]
                     break
         merged.append(whole)
