@@ -241,6 +241,13 @@ def _radial(r2, k1, k2, k3, k4, fisheye):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _bends(optics):  # type: ignore[no-untyped-def]
+    """Whether the lens distorts at all."""
+    _, _, _, _, _, k1, k2, p1, p2, k3, k4, fisheye = optics
+    return k1 != 0 or k2 != 0 or p1 != 0 or p2 != 0 or k3 != 0 or k4 != 0 or fisheye != 0
+
+
+@njit(cache=True)
 def _walk(kept, noise):  # type: ignore[no-untyped-def]
     walk = noise.copy()
     for p in range(1, len(noise)):
@@ -248,31 +255,46 @@ def _walk(kept, noise):  # type: ignore[no-untyped-def]
     return walk
 
 
+@njit(cache=True, inline="always")
+def _photo(eyes, turns, normal, p):  # type: ignore[no-untyped-def]
+    """What `_view` needs of one photo, as plain numbers: eye, axes, and the normal in the camera's frame."""
+    R = turns[p]
+    facing = (
+        R[0, 0] * normal[0] + R[1, 0] * normal[1] + R[2, 0] * normal[2],
+        R[0, 1] * normal[0] + R[1, 1] * normal[1] + R[2, 1] * normal[2],
+        R[0, 2] * normal[0] + R[1, 2] * normal[1] + R[2, 2] * normal[2],
+    )
+    axes = (R[0, 0], R[1, 0], R[2, 0], R[0, 1], R[1, 1], R[2, 1], R[0, 2], R[1, 2], R[2, 2])
+    return (eyes[p, 0], eyes[p, 1], eyes[p, 2]), axes, facing
+
+
 @njit(cache=True)
-def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def]
-    """Whether a photo's frame holds a point; the cosine of its incidence, and the ground sample distance
-    (mm/px) along its worst direction.
+def _view(px, py, pz, photo, optics, widest, bent):  # type: ignore[no-untyped-def]
+    """Whether a photo's frame holds a point; the squared cosine of its incidence (0 from behind), and the
+    squared ground sample distance (mm/px) along its worst direction. bent: whether the lens distorts.
 
     A point seen at ideal (x, y) lies at z·(x, y, 1) with z = c / (n·(x, y, 1)); the derivatives with respect
     to x and y, over the focal length, are a pixel's sides on the surface."""
-    dx, dy, dz = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
-    z = R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz
+    eye, axes, facing = photo
+    dx, dy, dz = px - eye[0], py - eye[1], pz - eye[2]
+    z = axes[6] * dx + axes[7] * dy + axes[8] * dz
     if z <= 1e-9:
         return False, 0.0, np.inf
-    x = (R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) / z
-    y = (R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz) / z
+    over_z = 1.0 / z
+    x = (axes[0] * dx + axes[1] * dy + axes[2] * dz) * over_z
+    y = (axes[3] * dx + axes[4] * dy + axes[5] * dz) * over_z
     r2 = x * x + y * y
     if r2 > widest:
         return False, 0.0, np.inf
     f, cx, cy, width, height, k1, k2, p1, p2, k3, k4, fisheye = optics
-    radial, bend = _radial(r2, k1, k2, k3, k4, fisheye)
-    column = f * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx + 0.5
-    row = f * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy + 0.5
+    radial, bend, column, row = 1.0, 0.0, f * x + cx + 0.5, f * y + cy + 0.5
+    if bent:
+        radial, bend = _radial(r2, k1, k2, k3, k4, fisheye)
+        column = f * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx + 0.5
+        row = f * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy + 0.5
     if not (0 <= column <= width and 0 <= row <= height):
         return False, 0.0, np.inf
-    nx = R[0, 0] * normal[0] + R[1, 0] * normal[1] + R[2, 0] * normal[2]
-    ny = R[0, 1] * normal[0] + R[1, 1] * normal[1] + R[2, 1] * normal[2]
-    nz = R[0, 2] * normal[0] + R[1, 2] * normal[1] + R[2, 2] * normal[2]
+    nx, ny, nz = facing
     towards = x * nx + y * ny + nz
     if towards >= -1e-9:
         return True, 0.0, np.inf
@@ -286,7 +308,7 @@ def _view(point, eye, R, normal, optics, widest):  # type: ignore[no-untyped-def
         bx, by, bz = (bx - tx * y) / radial, (by - ty * y) / radial, (bz - tz * y) / radial
     aa, bb, ab = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, ax * bx + ay * by + az * bz
     largest = (aa + bb) / 2 + np.sqrt(((aa - bb) / 2) ** 2 + ab * ab)
-    return True, -towards / np.sqrt(r2 + 1), np.sqrt(largest) * 1000 / f
+    return True, towards * towards / (r2 + 1), largest * (1e6 / (f * f))
 
 
 @njit(cache=True)
@@ -294,19 +316,21 @@ def _count(  # type: ignore[no-untyped-def]
     eyes, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos,
     photos, well, hidden, oblique, coarse, best,
 ):  # fmt: skip
+    bent = _bends(optics)
     for p in range(len(eyes)):
+        photo = _photo(eyes, turns, normal, p)
         for k in range(first[p], first[p + 1]):
             s = samples[k]
-            inside, cos, size = _view(points[s], eyes[p], turns[p], normal, optics, widest)
+            inside, cos2, size2 = _view(points[s, 0], points[s, 1], points[s, 2], photo, optics, widest, bent)
             if not inside:
                 continue
             if not visible[k]:
                 hidden[s] = True
-            elif cos < least_cos:
+            elif cos2 < least_cos * least_cos:
                 oblique[s] = True
             else:
-                best[s] = min(best[s], size)
-                if size > gsd:
+                best[s] = min(best[s], np.sqrt(size2))
+                if size2 > gsd * gsd:
                     coarse[s] = True
                 else:
                     photos[s] += 1
@@ -317,16 +341,17 @@ def _count(  # type: ignore[no-untyped-def]
 def _shows(  # type: ignore[no-untyped-def]
     eyes, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos, back_m, well
 ):
+    bent = _bends(optics)
     for p in range(len(eyes)):
+        photo = _photo(eyes, turns, normal, p)
+        eye = photo[0]
         for k in range(first[p], first[p + 1]):
             if visible[k]:
-                point, eye = points[samples[k]], eyes[p]
-                inside, cos, size = _view(point, eye, turns[p], normal, optics, widest)
-                if inside and cos >= least_cos:
-                    away = np.sqrt(
-                        (point[0] - eye[0]) ** 2 + (point[1] - eye[1]) ** 2 + (point[2] - eye[2]) ** 2
-                    )
-                    well[k] = size * (1 + back_m / away) <= gsd
+                x, y, z = points[samples[k], 0], points[samples[k], 1], points[samples[k], 2]
+                inside, cos2, size2 = _view(x, y, z, photo, optics, widest, bent)
+                if inside and cos2 >= least_cos * least_cos:
+                    away = np.sqrt((x - eye[0]) ** 2 + (y - eye[1]) ** 2 + (z - eye[2]) ** 2)
+                    well[k] = np.sqrt(size2) * (1 + back_m / away) <= gsd
 
 
 @njit(cache=True, nogil=True)
@@ -334,13 +359,18 @@ def _photos_of(  # type: ignore[no-untyped-def]
     eyes, places, turns, first, samples, visible, points, normal, optics, widest, gsd, least_cos
 ):
     photos = np.zeros(len(points), dtype=np.int64)
-    best = np.full(len(points), np.inf)
+    best2 = np.full(len(points), np.inf)
+    least_cos2, gsd2, bent = least_cos * least_cos, gsd * gsd, _bends(optics)
     for p in range(len(eyes)):
+        photo = _photo(eyes, turns, normal, p)
+        seen = visible[places[p]]
         for k in range(first[p], first[p + 1]):
-            if visible[places[p], k]:
+            if seen[k]:
                 s = samples[k]
-                inside, cos, size = _view(points[s], eyes[p], turns[p], normal, optics, widest)
-                if inside and cos >= least_cos:
-                    best[s] = min(best[s], size)
-                    photos[s] += size <= gsd
-    return photos, best
+                inside, cos2, size2 = _view(
+                    points[s, 0], points[s, 1], points[s, 2], photo, optics, widest, bent
+                )
+                if inside and cos2 >= least_cos2:
+                    best2[s] = min(best2[s], size2)
+                    photos[s] += size2 <= gsd2
+    return photos, np.sqrt(best2)
