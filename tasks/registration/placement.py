@@ -155,10 +155,11 @@ class _Growing:
                 yield T @ to_scanner
 
     def _by_plan(self, shape: Shape) -> list[Array]:
-        """From the plan, each at the height at which the clouds come nearest."""
+        """From the plan, which knows no heights and shifts only to a cell, each moved to where the clouds come
+        nearest."""
         found = plan_search.shifts_and_turns(shape.cloud, self.union, self.voxel_m, MOTIONS)
         sample_m = balanced_sample(shape.cloud, SEARCH_POINTS // 3, 0).points_m.astype(np.float64)
-        return [self.field.best_height(T, sample_m) for T in found]
+        return [self.field.settled(T, sample_m) for T in found]
 
     def _by_features(self, shape: Shape) -> list[Array]:
         features = np.concatenate([self.shapes[i].features for i in self.T])
@@ -167,11 +168,23 @@ class _Growing:
         return feature_match.motions(source_m, self.united_m[target], self.voxel_m, MOTIONS)
 
     def _least_contradicting(self, candidate: int, motions: list[Array]) -> list[Array]:
-        """Where parts look alike, much may agree on a wrong motion: what was seen through decides."""
-        return sorted(motions, key=lambda T: self._contradiction(candidate, T))[: 2 * PROPOSALS]
+        """Where parts look alike, much may agree on a wrong motion: what was seen through decides. Motions
+        that bring too little together do not count."""
+        cloud = self.shapes[candidate].cloud
+
+        def meets(T: Array) -> bool:
+            return overlap(cloud, self.union, T, 2 * self.voxel_m).share >= self.min_overlap
+
+        def doubt(T: Array) -> float:
+            return visibility.doubt(self._sights(candidate, T))
+
+        return sorted(filter(meets, motions), key=doubt)[: 2 * PROPOSALS]
 
     def _contradiction(self, candidate: int, T: Array) -> float:
-        """With all placed stations together: people and cars weigh little in what many saw."""
+        return visibility.contradiction(self._sights(candidate, T))
+
+    def _sights(self, candidate: int, T: Array) -> list[tuple[float, float]]:
+        """Of all placed stations: people and cars weigh little in what many saw."""
         shape = self.shapes[candidate]
         sights = []
         for other, T_other in self.T.items():
@@ -186,7 +199,7 @@ class _Growing:
                     inverse(T_other_candidate),
                 )
             )
-        return visibility.contradiction(sights)
+        return sights
 
     def _frame_of_world(self) -> Array | None:
         """Where the world of the statements lies in the component's frame, once that is known."""

@@ -113,6 +113,12 @@ def contradiction(sights: Sequence[tuple[float, float]]) -> float:
     return through / (through + met) if through + met > ENOUGH else 0.0
 
 
+def doubt(sights: Sequence[tuple[float, float]]) -> float:
+    """To rank motions by: as `contradiction`, but that one which brings little into sight is half doubted."""
+    through, met = sum(t for t, _ in sights), sum(m for _, m in sights)
+    return (through + ENOUGH) / (through + met + 2 * ENOUGH)
+
+
 def _directions(
     offset_m: Array, cell_deg: float
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Array]:

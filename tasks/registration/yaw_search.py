@@ -43,13 +43,15 @@ class DistanceField:
         distance = self.distance_m[cells[..., 0], cells[..., 1], cells[..., 2]]
         return np.where(inside, 1 - distance / np.float32(self.reach_m), np.float32(0))
 
-    def best_height(self, T_field_source: Array, source_m: Array) -> Array:
-        """T moved up or down to where the source comes nearest."""
-        moved = transform(T_field_source, source_m)
+    def settled(self, T_field_source: Array, source_m: Array) -> Array:
+        """T moved up or down, and a little aside, to where the source comes nearest."""
         heights_m = np.arange(-HIGHEST_M, HIGHEST_M + 1e-9, self.reach_m / 4)
-        scores = [float(self.closeness(moved + np.array([0.0, 0.0, h])).mean()) for h in heights_m]
+        aside_m = np.arange(-self.reach_m / 2, self.reach_m / 2 + 1e-9, self.reach_m / 8)
         T = T_field_source.copy()
-        T[2, 3] += heights_m[int(np.argmax(scores))]
+        for axis, steps_m in ((2, heights_m), (0, aside_m), (1, aside_m), (0, aside_m), (2, heights_m)):
+            moved, along = transform(T, source_m), np.eye(3)[axis]
+            scores = [float(self.closeness(moved + step * along).mean()) for step in steps_m]
+            T[axis, 3] += steps_m[int(np.argmax(scores))]
         return T
 
 
