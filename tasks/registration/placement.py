@@ -155,8 +155,7 @@ class _Growing:
                 yield T @ to_scanner
 
     def _by_plan(self, shape: Shape) -> list[Array]:
-        """From the plan, which knows no heights and shifts only to a cell, each moved to where the clouds come
-        nearest."""
+        """From the plan, which knows no heights and shifts by cells, each moved to where the clouds meet."""
         found = plan_search.shifts_and_turns(shape.cloud, self.union, self.voxel_m, MOTIONS)
         sample_m = balanced_sample(shape.cloud, SEARCH_POINTS // 3, 0).points_m.astype(np.float64)
         return [self.field.settled(T, sample_m) for T in found]
