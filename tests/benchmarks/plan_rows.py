@@ -1,6 +1,7 @@
 """Rows of `make bench-planning` on whole plans: what they see, how near they fly, what they cost."""
 
 import resource
+from multiprocessing import get_context
 
 import numpy as np
 
@@ -8,7 +9,9 @@ from schemas.camera import Camera
 from schemas.geodesy import GeoOrigin
 from schemas.settings import PlanSettings
 from schemas.vehicle import Vehicle
+from tasks.planning.airspace import Airspace
 from tasks.planning.completing import CLOSER
+from tasks.planning.occupancy import voxel_grid
 from tasks.planning.plan import plan_and_prove
 from tests.benchmarks.planning_scenes import OPEN, Truth, girder_bridge, random_scene, simulated
 from tests.benchmarks.table import Row, cpu_s, row
@@ -97,3 +100,34 @@ def bridge() -> list[Row]:
         row("peak memory", gib, "GiB", "≤ 4", data, None),
         row("exponent of time in area, 30 to 90 m", exponent, "1", "≤ 1.2", data, None),
     ]
+
+
+def large_site() -> list[Row]:
+    """The occupancy grid of 300 × 300 × 100 m at 0.5 m, in a process of its own."""
+    with get_context("spawn").Pool(1) as alone:
+        cells, voxel_m, points, gib = alone.apply(_large_grid)
+    data = f"60 towers on 300 × 300 m of ground, {points:,} points; {cells:,} voxels of {voxel_m:g} m"
+    return [row("occupancy of a large site: peak memory of the process", gib, "GiB", "≤ 1", data, "0")]
+
+
+def _large_grid() -> tuple[int, float, int, float]:
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.arange(0.0, 300.0, 0.25), np.arange(0.0, 300.0, 0.25))
+    points = [np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])]
+    for _ in range(60):
+        middle, width, height = rng.uniform(20, 280, 2), rng.uniform(4, 12, 2), rng.uniform(5, 60)
+        along, z = np.meshgrid(np.arange(-0.5, 0.5, 0.02), np.arange(0, height, 0.3))
+        for axis in (0, 1):
+            wall = np.empty((z.size, 3))
+            wall[:, axis] = middle[axis] + along.ravel() * width[axis]
+            wall[:, 1 - axis], wall[:, 2] = middle[1 - axis] + width[1 - axis] / 2, z.ravel()
+            points.append(wall)
+    every = np.concatenate(points)
+    airspace = Airspace(every, 1.5, 0.5, 120.0)
+    grid = voxel_grid(airspace, np.zeros(3), np.array([300.0, 300.0, 100.0]), 0.5)
+    return (
+        grid.free.size,
+        grid.voxel_m,
+        len(every),
+        resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
+    )

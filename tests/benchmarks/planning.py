@@ -12,6 +12,7 @@ PARTS = {
     "coverage": plan_rows.coverage,
     "clearance": plan_rows.clearance,
     "bridge": plan_rows.bridge,
+    "large-site": plan_rows.large_site,
     "missions": mission_rows.rows,
 }
 
