@@ -4,7 +4,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
+from scipy.signal import wiener
 
+from schemas.raster import Pixels
 from tasks.surfaces.cloud import Floats, Indices
 
 REACH_M = 0.15  # off the plane: farther things stand before the surface or lie behind it
@@ -13,9 +16,11 @@ COARSE_M = 0.05  # cells that tell how dense the points are
 SPACINGS = 2.0  # a cell's side, in mean distances of points: some four points a cell
 SMALLEST_M, LARGEST_M = 0.02, 0.5  # of a cell
 FEWEST = 100  # points
+SMOOTHED_CELLS = 3  # side of the window that tells noise from relief
 STANDS_OUT_M = 0.02  # of the median of 5 × 5 cells, beyond noise: no skin of a wall
 MAD = 1.4826  # σ of the median absolute deviation; and the median of n points is 1.25 σ/√n
 MEDIAN = 1.2533
+DRAWN_PX = 900  # of a picture's longer side
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ def heights_of(uvw_m: Floats, bounds_m: tuple[float, float, float, float]) -> He
     """From (N, 3) points in the surface's frame; None where they tell of no relief beyond their noise.
 
     Each cell has the median of its points; cells that stand out from all around them (a cable before the
-    wall) and those without points are filled from around."""
+    wall) and those without points are filled from around. sigma_m is stated as before the smoothing."""
     low, high = np.array(bounds_m[:2]) - AROUND_M, np.array(bounds_m[2:]) + AROUND_M
     near = (np.abs(uvw_m[:, 2]) < REACH_M) & ((uvw_m[:, :2] > low) & (uvw_m[:, :2] < high)).all(axis=1)
     points = uvw_m[near]
@@ -53,7 +58,8 @@ def heights_of(uvw_m: Floats, bounds_m: tuple[float, float, float, float]) -> He
     w.flat[index], known.flat[index] = median, 1.0
     around = cv2.medianBlur(_filled(w, known).astype(np.float32), 5)
     known[np.abs(w - around) > STANDS_OUT_M + 5.0 * sigma] = 0.0
-    return Heights(_filled(w, known), float(low[0]), float(low[1]), cell, sigma)
+    smooth = wiener(_filled(w, known), SMOOTHED_CELLS, sigma**2)  # Lee 1980: noise goes, steps stay
+    return Heights(np.asarray(smooth), float(low[0]), float(low[1]), cell, sigma)
 
 
 def _medians(cell: Indices, w: Floats) -> tuple[Indices, Floats, Indices, float]:
@@ -76,3 +82,13 @@ def _filled(w: Floats, known: Floats) -> Floats:
     coarse = _filled(np.where(weight > 0, mean, 0.0), (weight > 0).astype(np.float64))
     smooth = cv2.resize(coarse, w.shape[::-1], interpolation=cv2.INTER_LINEAR)
     return np.asarray(np.where(known > 0, w, smooth))
+
+
+def draw_heights(w_m: npt.NDArray[np.float32]) -> tuple[Pixels, float, float]:
+    """(H, W, 3) RGB of heights, v up; and those of its darkest and its brightest colour, metres."""
+    low, high = (float(x) for x in np.percentile(w_m, [10, 90]))
+    share = np.clip((w_m - low) / max(high - low, 1e-9), 0, 1)[::-1]
+    size = max(1, round(DRAWN_PX / max(w_m.shape)))
+    coloured = cv2.applyColorMap(np.asarray(255 * share, np.uint8), cv2.COLORMAP_VIRIDIS)
+    large = cv2.resize(coloured, None, fx=size, fy=size, interpolation=cv2.INTER_NEAREST)
+    return np.ascontiguousarray(large[..., ::-1]), low, high

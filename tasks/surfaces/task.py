@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from artifacts import store
-from artifacts.page import Page
+from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of
 from schemas.raster import Pixels
 from schemas.registered_model import RegisteredModel
@@ -70,7 +70,22 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
     )
 
 
-@stage()
+def relief_pages(inputs: Mapping[str, Any], reliefs: tuple[Relief, ...]) -> list[Page]:
+    """A picture of each relief, its colours from the lowest to the highest tenth."""
+    from tasks.surfaces.relief import draw_heights
+
+    pages = []
+    for relief in reliefs:
+        picture, low_m, high_m = draw_heights(np.load(store.current().path(relief.heights)))
+        known = f"{1000 * relief.rms_m:.1f} mm RMS off its plane, known to {1000 * relief.sigma_m:.1f} mm"
+        colours = f"Blue {1000 * low_m:+.1f} mm, yellow {1000 * high_m:+.1f} mm"
+        title = f"### Relief of {relief.surface}: {known}\n\n{colours}"
+        drawn = markdown_of(picture, f"heights of {relief.surface} over its plane")
+        pages.append(Page(key=page_key("relief", relief.surface), markdown=f"{title}\n\n{drawn}"))
+    return pages
+
+
+@stage(pages=relief_pages)
 def measure_relief(model: RegisteredModel, surfaces: tuple[Surface, ...]) -> tuple[Relief, ...]:
     """How surfaces stand out of their planes; none of those that are flat within the scans' noise."""
     from tasks.surfaces.cloud import on_surface, read_table

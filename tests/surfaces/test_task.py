@@ -12,7 +12,7 @@ from schemas.problem import BadInput
 from schemas.registered_model import RegisteredModel, Station
 from schemas.settings import SurfaceSettings
 from schemas.structure import Structure
-from tasks.surfaces.task import extract, measure_relief, pages
+from tasks.surfaces.task import extract, measure_relief, pages, relief_pages
 from tests.development_data import development_data
 from tests.surfaces.scanner import Box, scan
 from tests.surfaces.test_cloud import write_ply
@@ -76,6 +76,9 @@ def test_a_wall_that_bulges_has_a_relief_and_a_flat_one_none(
     r, c = np.unravel_index(int(np.argmax(w_m)), w_m.shape)
     place = flat[0].to_world([(relief.left_m + c * relief.cell_m, relief.bottom_m + r * relief.cell_m)])[0]
     np.testing.assert_allclose(place[[0, 2]], [0.0, 0.5], atol=2 * relief.cell_m)
+    (page,) = relief_pages({}, (relief,))
+    assert "Relief of wall-south-01" in (page.markdown or "")
+    assert "data:image/jpeg;base64," in (page.markdown or "")
 
 
 def test_a_model_without_surfaces_names_its_stations(tmp_path: Path) -> None:
