@@ -16,7 +16,7 @@ from schemas.camera import Camera, CameraPose
 from schemas.file import File
 from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
-from schemas.geodesy import GeoOrigin, anchored
+from schemas.geodesy import GeoOrigin
 from schemas.inspection import Inspection, PhotoSet, SimulationInput
 from schemas.problem import BadInput, LeftOut
 from schemas.structure import Structure
@@ -81,8 +81,10 @@ def where_it_lies(inspection: Inspection, structure: Structure) -> GeoOrigin:
     if inspection.anchors and inspection.origin is not None:
         raise BadInput("anchors", "the inspection has an origin too", "Give the one or the other")
     if inspection.anchors:
-        return anchored(inspection.anchors)
-    return inspection.origin or structure.geo_origin(inspection.utm_zone) or REHEARSAL_ORIGIN
+        return structure.anchored(inspection.anchors)
+    if inspection.origin is not None:
+        return structure.origin_as_stated(inspection.origin)
+    return structure.geo_origin(inspection.utm_zone) or REHEARSAL_ORIGIN
 
 
 def collect(

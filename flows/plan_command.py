@@ -163,13 +163,13 @@ def _where(
     anchors: list[Six] | None,
     utm_zone: str | None,
 ) -> "GeoOrigin | None":
-    from schemas.geodesy import GeoOrigin, KnownPoint, anchored
+    from schemas.geodesy import GeoOrigin, KnownPoint
 
     if origin and anchors:
         raise BadInput("--anchor", "an origin is given too", "Give the one or the other")
     try:
         if anchors:
-            found = anchored(
+            found = structure.anchored(
                 [
                     KnownPoint(model_m=a[:3], latitude_deg=a[3], longitude_deg=a[4], altitude_m=a[5])
                     for a in anchors
@@ -181,7 +181,8 @@ def _where(
             )
             return found
         if origin:
-            return GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
+            stated = GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
+            return structure.origin_as_stated(stated)
         return structure.geo_origin(utm_zone and TypeAdapter(UtmZone).validate_python(utm_zone))
     except ValidationError as problem:
         given = "--anchor" if anchors else "--origin" if origin else "--utm-zone"

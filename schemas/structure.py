@@ -1,12 +1,17 @@
 """Surfaces and obstacles of a structure: what planning needs to know about the world."""
 
+import math
+from collections.abc import Sequence
+
 from schemas.contract import Contract, Vector3
 from schemas.file import File
-from schemas.geodesy import GeoOrigin
+from schemas.geodesy import GeoOrigin, KnownPoint, anchored
 from schemas.obstacle import Obstacle
-from schemas.problem import LeftOut
+from schemas.problem import BadInput, LeftOut
 from schemas.surface import Surface
 from schemas.utm import UtmZone, utm_origin
+
+FARTHEST_M = 1000.0  # from the scanned world: a known point beyond is none of it
 
 
 class Structure(Contract):
@@ -25,3 +30,38 @@ class Structure(Contract):
         does not lie in it."""
         zone = utm_zone or self.utm_zone
         return None if zone is None else utm_origin(zone, self.world_origin_m)
+
+    def origin_as_stated(self, origin: GeoOrigin) -> GeoOrigin:
+        """A stated WGS84 place of the scans' (0, 0, 0). BadInput where their coordinates are so large that
+        they were shifted: no plane that touches the Earth there holds a mission here."""
+        if any(self.world_origin_m):
+            away_km = math.hypot(*self.world_origin_m) / 1000
+            raise BadInput(
+                "origin",
+                f"says where (0, 0, 0) of the scans lies, but they lie {away_km:,.0f} km from it: no mission"
+                " can be placed from there",
+                "Give the zone of their map grid (utm_zone: 32N), or two known points (anchors)",
+            )
+        return origin
+
+    def anchored(self, points: Sequence[KnownPoint]) -> GeoOrigin:
+        """The origin that known points tell, given as the model or, where it was shifted, as the scans have
+        them. BadInput for a point that is far from both, and as `geodesy.anchored` says."""
+        return anchored([self._of_the_model(point) for point in points])
+
+    def _of_the_model(self, point: KnownPoint) -> KnownPoint:
+        x, y, z = (a - b for a, b in zip(point.model_m, self.world_origin_m, strict=True))
+        shifted = point.model_copy(update={"model_m": (x, y, z)})
+        nearest = min((point, shifted), key=self._away_m)
+        if self._away_m(nearest) > FARTHEST_M:
+            raise BadInput(
+                "anchors",
+                f"a known point, {point.model_m}, lies {self._away_m(nearest) / 1000:,.0f} km from the model",
+                "Give model_m in metres, in the coordinates of the scans",
+            )
+        return nearest
+
+    def _away_m(self, point: KnownPoint) -> float:
+        """From the scanned world, as if it were a box."""
+        outside = zip(self.min_m, point.model_m, self.max_m, strict=True)
+        return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in outside))
