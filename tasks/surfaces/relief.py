@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import wiener
+from scipy.fft import dctn, idctn
+from scipy.stats import chi2
 
 from schemas.raster import Pixels
 from tasks.surfaces.cloud import Floats, Indices
@@ -16,10 +17,9 @@ COARSE_M = 0.05  # cells that tell how dense the points are
 SPACINGS = 2.0  # a cell's side, in mean distances of points: some four points a cell
 SMALLEST_M, LARGEST_M = 0.02, 0.5  # of a cell
 FEWEST = 100  # points
-SMOOTHED_CELLS = 3  # side of the window that tells noise from relief
 STANDS_OUT_M = 0.02  # of the median of 5 × 5 cells, beyond noise: no skin of a wall
-MAD = 1.4826  # σ of the median absolute deviation; and the median of n points is 1.25 σ/√n
-MEDIAN = 1.2533
+MEDIAN = 1.2533  # the median of n points is off by 1.25 σ/√n
+BANDS = 40  # of wave lengths, each as noisy or as real throughout
 DRAWN_PX = 900  # of a picture's longer side
 
 
@@ -38,7 +38,7 @@ def heights_of(uvw_m: Floats, bounds_m: tuple[float, float, float, float]) -> He
     """From (N, 3) points in the surface's frame; None where they tell of no relief beyond their noise.
 
     Each cell has the median of its points; cells that stand out from all around them (a cable before the
-    wall) and those without points are filled from around. sigma_m is stated as before the smoothing."""
+    wall) and those without points are filled from around; then the noise is taken out."""
     low, high = np.array(bounds_m[:2]) - AROUND_M, np.array(bounds_m[2:]) + AROUND_M
     near = (np.abs(uvw_m[:, 2]) < REACH_M) & ((uvw_m[:, :2] > low) & (uvw_m[:, :2] < high)).all(axis=1)
     points = uvw_m[near]
@@ -58,8 +58,8 @@ def heights_of(uvw_m: Floats, bounds_m: tuple[float, float, float, float]) -> He
     w.flat[index], known.flat[index] = median, 1.0
     around = cv2.medianBlur(_filled(w, known).astype(np.float32), 5)
     known[np.abs(w - around) > STANDS_OUT_M + 5.0 * sigma] = 0.0
-    smooth = wiener(_filled(w, known), SMOOTHED_CELLS, sigma**2)  # Lee 1980: noise goes, steps stay
-    return Heights(np.asarray(smooth), float(low[0]), float(low[1]), cell, sigma)
+    likeliest, sigma = _without_noise(_filled(w, known), sigma)
+    return Heights(likeliest, float(low[0]), float(low[1]), cell, sigma)
 
 
 def _medians(cell: Indices, w: Floats) -> tuple[Indices, Floats, Indices, float]:
@@ -68,8 +68,22 @@ def _medians(cell: Indices, w: Floats) -> tuple[Indices, Floats, Indices, float]
     index, first, count = np.unique(cell[order], return_index=True, return_counts=True)
     sorted_w = w[order]
     median = (sorted_w[first + (count - 1) // 2] + sorted_w[first + count // 2]) / 2
-    off = np.abs(sorted_w - np.repeat(median, count))[np.repeat(count >= 3, count)]
-    return index, median, count, MAD * float(np.median(off)) if len(off) else 0.0
+    off = sorted_w - np.repeat(np.add.reduceat(sorted_w, first) / count, count)
+    several = count >= 3
+    squares = np.add.reduceat(off**2, first)[several] / chi2.median(count[several] - 1)
+    return index, median, count, float(np.sqrt(np.median(squares))) if several.any() else 0.0
+
+
+def _without_noise(w: Floats, sigma: float) -> tuple[Floats, float]:
+    """What the heights are likeliest to be, and how well they are then known: the waves of each length shrunk
+    by the share of noise in their power (Wiener 1949). Heights with their noise would make every parallax
+    look too small, and so the cameras too far away (regression dilution)."""
+    waves = dctn(w - w.mean(), norm="ortho")
+    row, column = np.indices(w.shape)
+    band = np.rint(BANDS * np.hypot(row / w.shape[0], column / w.shape[1])).astype(np.int64).ravel()
+    power = np.bincount(band, waves.ravel() ** 2) / np.maximum(np.bincount(band), 1)
+    kept = np.clip(1.0 - sigma**2 / np.maximum(power, 1e-30), 0.0, 1.0)[band].reshape(w.shape)
+    return np.asarray(idctn(waves * kept, norm="ortho") + w.mean()), sigma * float(np.sqrt(kept.mean()))
 
 
 def _filled(w: Floats, known: Floats) -> Floats:

@@ -53,6 +53,7 @@ class Run:
     refused: dict[str, str]  # before stitching, by name
     cpu_s: float
     steps_px: Array  # across seams
+    heights: HeightMap | None  # that the mosaic lies on
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,8 @@ def run(photos: WallPhotos) -> Run:
     surface, relief = photos.face.surface(), _relief(photos)
     mosaic = stitch.bare("wall", surface, tuple(taken), described, settings, None, relief)
     cpu_s = time.process_time() - began
-    return Run(photos, mosaic, refused, cpu_s, seam_steps_px(mosaic, photos))
+    heights = _heights(mosaic)
+    return Run(photos, mosaic, refused, cpu_s, seam_steps_px(mosaic, photos, heights), heights)
 
 
 def _relief(photos: WallPhotos) -> Relief | None:
@@ -110,7 +112,7 @@ def _relief(photos: WallPhotos) -> Relief | None:
     return relief
 
 
-def seam_steps_px(mosaic: Mosaic, photos: WallPhotos) -> Array:
+def seam_steps_px(mosaic: Mosaic, photos: WallPhotos, heights: HeightMap | None) -> Array:
     """(N,) at pixels where two photos meet: how far apart on the wall lies what they show there."""
     source = tifffile.imread(store.current().path(mosaic.source), level=0).astype(np.int64)
     across = np.argwhere((source[:, 1:] != source[:, :-1]) & (source[:, 1:] > 0) & (source[:, :-1] > 0))
@@ -123,18 +125,22 @@ def seam_steps_px(mosaic: Mosaic, photos: WallPhotos) -> Array:
         if not {mosaic.photos[i].name, mosaic.photos[j].name} <= photos.truth.keys():
             continue
         at = seams[(pairs == [i, j]).all(axis=1)][:, [1, 0]].astype(float)
-        shown = [photos.truth[mosaic.photos[k].name].see(_in_photo(mosaic, k, at)) for k in (i, j)]
+        shown = [photos.truth[mosaic.photos[k].name].see(_in_photo(mosaic, k, at, heights)) for k in (i, j)]
         steps.append(np.linalg.norm(shown[0] - shown[1], axis=1) / GSD_M)
     return np.concatenate(steps)
 
 
-def errors(mosaic: Mosaic, photos: WallPhotos) -> Errors:
+def errors(run: Run) -> Errors:
+    mosaic, photos = run.mosaic, run.photos
     solved = [
         (photo, placement)
         for photo, placement in zip(mosaic.photos, mosaic.placements, strict=True)
         if placement.status == "solved" and photo.name in photos.truth
     ]
-    found = [_on_plane(mosaic, photo, placement, photos.truth[photo.name].px) for photo, placement in solved]
+    found = [
+        _on_plane(mosaic, photo, placement, photos.truth[photo.name].px, run.heights)
+        for photo, placement in solved
+    ]
     real = [photos.truth[photo.name].uv_m for photo, _ in solved]
     off = _after_similarity(found, real) / GSD_M
     middle = [one.mean(axis=0)[None] for one in found]
@@ -156,7 +162,9 @@ def errors(mosaic: Mosaic, photos: WallPhotos) -> Errors:
     )
 
 
-def _on_plane(mosaic: Mosaic, photo: Photo, placement: PhotoPlacement, px: Array) -> Array:
+def _on_plane(
+    mosaic: Mosaic, photo: Photo, placement: PhotoPlacement, px: Array, heights: HeightMap | None
+) -> Array:
     """(N, 2) metres where the mosaic shows (N, 2) pixels of the photo as taken."""
     assert placement.H_mosaic_photo is not None
     camera = photo.camera
@@ -165,7 +173,6 @@ def _on_plane(mosaic: Mosaic, photo: Photo, placement: PhotoPlacement, px: Array
     q = np.column_stack([flat, np.ones(len(flat))]) @ np.array(placement.H_mosaic_photo).T
     xy = q[:, :2] / q[:, 2:]
     flat = np.asarray(xy * (mosaic.gsd_mm_px or 0.0) / 1000.0 * [1, -1] + mosaic.origin_uv_m)
-    heights = _heights(mosaic)
     return flat if heights is None else heights.met(flat, np.asarray(placement.camera_uvw_m))
 
 
@@ -177,9 +184,9 @@ def _heights(mosaic: Mosaic) -> HeightMap | None:
     return HeightMap(w, of.left_m, of.bottom_m, of.cell_m)
 
 
-def _in_photo(mosaic: Mosaic, k: int, xy: Array) -> Array:
+def _in_photo(mosaic: Mosaic, k: int, xy: Array, heights: HeightMap | None) -> Array:
     """(N, 2) pixels of the k-th photo as taken that the mosaic shows at (N, 2) of its own."""
-    placement, camera, heights = mosaic.placements[k], mosaic.photos[k].camera, _heights(mosaic)
+    placement, camera = mosaic.placements[k], mosaic.photos[k].camera
     if heights is not None:  # where the ray through what stands over the plane meets the plane
         gsd_m, C = (mosaic.gsd_mm_px or 0.0) / 1000.0, np.asarray(placement.camera_uvw_m)
         uv = xy * gsd_m * [1, -1] + mosaic.origin_uv_m
@@ -219,7 +226,7 @@ def row(
 
 def rows_of(case: Case, runs: Sequence[Run], data: str) -> list[dict[str, Any]]:
     """The worst of all seeds."""
-    scores = [errors(run.mosaic, run.photos) for run in runs]
+    scores = [errors(run) for run in runs]
     known: dict[str, Any] = {"data": data, "seed": f"1..{len(runs)}"}
     rms_bar, worst_bar = BARS.get(case.name, (None, None))
     d2 = np.concatenate([s.d2 for s in scores])
@@ -247,7 +254,7 @@ def rows_of(case: Case, runs: Sequence[Run], data: str) -> list[dict[str, Any]]:
 def peer_rows(photos: WallPhotos, ours: Run, data: str) -> list[dict[str, Any]]:
     """The plane set, first seed, stitched by others. Their errors hold the 0.3 px of reading a mosaic."""
     known: dict[str, Any] = {"data": data, "seed": 1}
-    error = errors(ours.mosaic, photos).rms_px
+    error = errors(ours).rms_px
     rows = []
     for name, stitch_photos in PEERS.items():
         if name in NEEDS and find_spec(NEEDS[name]) is None:
