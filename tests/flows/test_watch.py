@@ -142,9 +142,13 @@ def test_interrupted_it_says_what_lacks(tmp_path: Path, capsys: pytest.CaptureFi
     card = tmp_path / "card"
     card.mkdir()
     picture(0).save(card / f"{plan.shooting_points[0].photo}.jpg")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     interrupt = threading.Timer(4 * STILL_S, signal.raise_signal, [signal.SIGINT])  # Ctrl-C
     interrupt.start()
-    assert watch(card, plan=tmp_path / "plan.json") == EXIT_WAITING_FOR_FLIGHT
+    try:
+        assert watch(card, plan=tmp_path / "plan.json") == EXIT_WAITING_FOR_FLIGHT
+    finally:
+        signal.signal(signal.SIGINT, before)
     said = capsys.readouterr()
     assert "2 shooting points have no good photo" in said.err
     assert plan.shooting_points[1].photo in said.out
