@@ -78,7 +78,7 @@ def relief_pages(inputs: Mapping[str, Any], reliefs: tuple[Relief, ...]) -> list
     for relief in reliefs:
         picture, low_m, high_m = draw_heights(np.load(store.current().path(relief.heights)))
         known = f"{1000 * relief.rms_m:.1f} mm RMS off its plane, known to {1000 * relief.sigma_m:.1f} mm"
-        colours = f"Blue {1000 * low_m:+.1f} mm, yellow {1000 * high_m:+.1f} mm"
+        colours = f"Dark {1000 * low_m:+.1f} mm, bright {1000 * high_m:+.1f} mm"
         title = f"### Relief of {relief.surface}: {known}\n\n{colours}"
         drawn = markdown_of(picture, f"heights of {relief.surface} over its plane")
         pages.append(Page(key=page_key("relief", relief.surface), markdown=f"{title}\n\n{drawn}"))
