@@ -60,7 +60,7 @@ def test_viewers_find_foxglove_messages_and_checksums(tmp_path: Path) -> None:
     assert (pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) == (1.0, 2.0, 3.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(yaw=st.floats(0, 360), pitch=st.floats(-90, 90))
 def test_the_pose_points_where_the_lens_does(
     tmp_path_factory: pytest.TempPathFactory, yaw: float, pitch: float

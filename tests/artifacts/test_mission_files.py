@@ -156,7 +156,7 @@ def test_pymavlink_reads_what_we_write(tmp_path: Path) -> None:
 NUMBERS = st.none() | st.floats(-1e6, 1e6, width=32)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.builds(

@@ -48,7 +48,7 @@ def test_seen_from_the_south_east_is_right_and_up_is_up() -> None:
 
 
 @given(st.floats(0, 360), st.floats(-80, 80), st.integers(0, 1000))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_everything_fits_in_the_picture(azimuth_deg: float, elevation_deg: float, seed: int) -> None:
     points = np.random.default_rng(seed).normal(0, (20, 5, 3), (30, 3))
     seen = View(points, azimuth_deg, elevation_deg, 300, 200).project(points)
@@ -184,7 +184,7 @@ def test_reduction_keeps_the_mean_and_the_place(bridge: Inspected, size: tuple[i
 
 
 @given(st.integers(1, 400), st.integers(1, 400), st.integers(1, 80), st.integers(1, 80), st.integers(0, 99))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_single_mask_pixel_is_never_lost(height: int, width: int, h: int, w: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     mask = np.zeros((height, width), np.uint8)
@@ -256,7 +256,7 @@ def test_a_crack_lies_flat_where_its_surface_says(bridge: Inspected) -> None:
 
 
 @given(st.integers(0, 50), st.integers(100, 600), st.integers(4_000, 60_000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_a_picture_keeps_its_size_bound_even_of_noise(seed: int, side: int, max_bytes: int) -> None:
     noise = np.random.default_rng(seed).integers(0, 255, (side, side, 3), dtype=np.uint8)
     content = jpeg(noise, max_bytes)

@@ -11,7 +11,7 @@ from artifacts.store import Store
 
 
 @given(content=st.binary(max_size=2000))
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30, deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 def test_what_is_put_is_read_back(tmp_path: Path, content: bytes) -> None:
     source = tmp_path / "source.bin"
     source.unlink(missing_ok=True)

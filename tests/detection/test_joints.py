@@ -14,7 +14,7 @@ def line(angle_deg: float, length: float, thickness: int, size: int = 700) -> np
     return cv2.line(np.zeros((size, size), np.uint8), a, b, 1, thickness) > 0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0, 180), st.integers(1, 8))
 def test_a_straight_line_is_a_joint_in_any_direction(angle_deg: float, thickness: int) -> None:
     mask = line(angle_deg, 500, thickness)

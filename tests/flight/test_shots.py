@@ -54,7 +54,7 @@ def test_every_shot_gets_its_photo_pose_and_time() -> None:
         assert shot.reported
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(lost=st.sets(st.integers(0, len(NAMES) - 1)), counted=st.booleans())
 def test_lost_messages_are_filled_in_from_the_track(lost: set[int], counted: bool) -> None:
     recording = recorded(PLAN, FLOWN, counted)

@@ -31,7 +31,7 @@ def test_legitimate_differences_are_none() -> None:
     assert compare(ITEMS, TOLD) == []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     seq=st.integers(1, len(ITEMS) - 1),
     change=st.sampled_from([("x", 1), ("y", -1), ("z", 0.05), ("param1", 1.0), ("command", 1)]),

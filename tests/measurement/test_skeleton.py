@@ -19,7 +19,7 @@ def length(points: np.ndarray) -> float:
     return float(arc_length(smooth(points))[-1])
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0, 2 * np.pi), st.floats(60, 130), st.integers(1, 7))
 @example(0.75, 60.0, 3)
 def test_length_of_a_stroke_in_any_direction(direction: float, half: float, thickness: int) -> None:
@@ -62,7 +62,7 @@ def test_gaps_are_bridged_only_straight_ahead() -> None:
     assert len({p.network for p in crack_paths(aside, 30, 15)}) == 2
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.floats(0, 179.99), st.floats(5, 500))
 def test_orientation_of_a_line(direction: float, size: float) -> None:
     t = np.linspace(-size, size, 50)

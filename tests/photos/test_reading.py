@@ -157,7 +157,7 @@ def test_one_pixel_is_no_photo(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(share=st.floats(0.02, 0.9), seed=st.integers(0, 10_000))
 def test_a_truncated_or_scrambled_file_never_gets_out_as_another_error(
     tmp_path_factory: pytest.TempPathFactory, suffix: str, share: float, seed: int

@@ -16,7 +16,7 @@ def test_says_why_a_place_is_not_free() -> None:
     assert airspace.blocks(places).tolist() == [Block.FREE, Block.NEAR, Block.LOW, Block.HIGH]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_a_free_segment_keeps_its_clearance_everywhere(seed: int) -> None:
     rng = np.random.default_rng(seed)

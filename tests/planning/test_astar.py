@@ -53,7 +53,7 @@ def test_cost_equals_dijkstra(seed: int, weights: tuple[float, float, float]) ->
             assert found[1] == pytest.approx(truth, abs=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_the_path_adds_up_and_cuts_no_corner(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -28,7 +28,7 @@ def test_small_tours_are_nearly_always_the_best() -> None:
     assert np.median(excess) < 1e-9
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 10_000), st.integers(1, 40), st.booleans())
 def test_improving_keeps_every_point_and_never_lengthens(seed: int, count: int, closed: bool) -> None:
     cost = distances(seed, count)
@@ -43,7 +43,7 @@ def test_improving_keeps_every_point_and_never_lengthens(seed: int, count: int, 
         assert cost[better[:-1], better[1:]].sum() <= cost[start[:-1], start[1:]].sum() + 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10_000), st.integers(8, 60), st.booleans(), st.booleans())
 def test_kicking_keeps_every_point_and_never_lengthens(
     seed: int, count: int, closed: bool, metric: bool

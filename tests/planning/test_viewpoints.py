@@ -27,7 +27,7 @@ def views_of(surface: Surface, world: World, vehicle: Vehicle = VEHICLE) -> View
     return shooting_points(surface, CAMERA, vehicle, 4.0, 0.5, SETTINGS, airspace, scene)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     *(st.floats(0.3, 9), st.floats(0.3, 9), st.floats(0.5, 3), st.floats(0.5, 3)),
     *(st.floats(0.1, 0.8), st.floats(0, 1.5)),
@@ -75,7 +75,7 @@ def test_overlap_is_widened_by_the_jitter_and_bounded() -> None:
     assert widened_overlap(0.9, (1.6, 1.2), 0.5) == 0.9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1))
 def test_the_camera_looks_where_it_is_told(x: float, y: float, z: float) -> None:
     forward = np.array([[x, y, z]])

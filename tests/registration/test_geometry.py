@@ -34,7 +34,7 @@ small = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
 
 
 @given(small, small)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_exp_log_and_adjoint_belong_together(xi: Array, eta: Array) -> None:
     T = exp(xi)
     assert np.allclose(T @ inverse(T), np.eye(4), atol=1e-12)

@@ -168,7 +168,7 @@ def test_lzf_references() -> None:
 
 
 @given(st.binary(max_size=200), st.integers(0, 400))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_damaged_lzf_never_leaves_its_buffers(packed: bytes, size: int) -> None:
     with suppress(Unreadable):
         assert len(decompress(np.frombuffer(packed, np.uint8), size)) == size
@@ -235,7 +235,7 @@ def test_las_and_laz_keep_scale_and_offset(tmp_path: Path) -> None:
 
 
 @given(st.sampled_from(sorted(READERS)), st.binary(max_size=300))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_arbitrary_bytes_give_points_or_bad_input(
     tmp_path_factory: pytest.TempPathFactory, suffix: str, content: bytes
 ) -> None:

@@ -7,7 +7,7 @@ from tasks.simulation.marks import CELL_M, REACH_M, discs, in_cells, line, paint
 coordinate = st.floats(0.02, 0.48)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(a=st.tuples(coordinate, coordinate), b=st.tuples(coordinate, coordinate), t=st.floats(0, 1))
 def test_the_cell_of_every_point_near_a_line_knows_it(
     a: tuple[float, float], b: tuple[float, float], t: float

@@ -63,7 +63,7 @@ def test_bias_walks_slowly_and_jitter_quickly() -> None:
     assert np.sqrt((change**2).mean()) > 0.1
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     speed=st.floats(0.3, 8.0),
     acceleration=st.floats(0.3, 4.0),

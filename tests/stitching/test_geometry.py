@@ -75,7 +75,7 @@ def test_the_map_of_a_photo_is_exact_to_a_hundredth_of_a_pixel() -> None:
     assert np.abs(off).max() < 0.01
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(n=st.integers(1, 30), shared=st.integers(0, 3), seed=st.integers(0, 10_000))
 def test_skyline_solves_what_lapack_solves(n: int, shared: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

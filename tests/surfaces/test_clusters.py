@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from tasks.surfaces.clusters import euclidean_clusters
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.floats(0.02, 1.5))
 def test_clusters_are_the_components_of_all_pairs_within_epsilon(seed: int, epsilon_m: float) -> None:
     points = np.random.default_rng(seed).uniform(-2, 2, (200, 3))

@@ -34,7 +34,7 @@ def test_a_surface_is_called_by_the_way_it_faces() -> None:
     }
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_order_is_by_place_whatever_the_input_order_and_noise(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -74,7 +74,7 @@ def test_small_pieces_and_cars_that_come_and_go_rename_nothing() -> None:
     assert with_car[3].origin_m == car.origin_m
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.lists(st.floats(0.5, 100.0), max_size=20))
 def test_no_area_lies_near_the_limit_of_small_unless_areas_lie_everywhere(areas: list[float]) -> None:
     limit = _plain_m2(areas, 0.5)

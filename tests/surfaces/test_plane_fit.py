@@ -7,7 +7,7 @@ from tasks.surfaces.frame import Frame
 from tasks.surfaces.plane_fit import fit_plane, fit_planes
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_a_noisy_plane_is_found_to_a_tenth_of_a_degree_and_a_millimetre(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ from tasks.surfaces.cloud import Cloud
 from tasks.surfaces.voxels import thin, voxel_keys, voxelise
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 2.0))
 def test_a_mean_lies_in_its_voxel_and_every_point_has_one(seed: int, voxel_m: float) -> None:
     points = np.random.default_rng(seed).uniform(-3, 3, (300, 3))
