@@ -1,11 +1,11 @@
 """The network: a U-Net of depthwise convolutions. Nothing runs at full resolution: the first layer folds
-each 2×2 pixels into 24 channels, the last unfolds them, so that edges keep their place at a quarter of the
+each 2×2 pixels into 16 channels, the last unfolds them, so that edges keep their place at a quarter of the
 cost."""
 
 from torch import Tensor, nn
 
-WIDTHS = (24, 48, 96, 128)  # channels at 1/2, 1/4, 1/8, 1/16
-DEPTHS = (2, 3, 4, 5)  # layers there
+WIDTHS = (16, 32, 80, 112, 128)  # channels at 1/2, 1/4, 1/8, 1/16, 1/32
+DEPTHS = (2, 2, 4, 4, 5)  # layers there
 
 
 class Mixed(nn.Sequential):
@@ -46,21 +46,23 @@ class Up(nn.Module):
 
 
 class Network(nn.Module):
-    """(N, 3, H, W) RGB in 0..1 to (N, 1, H, W) logits; H and W multiples of 16."""
+    """(N, 3, H, W) RGB in 0..1 to (N, 1, H, W) logits; H and W multiples of 32."""
 
     def __init__(self) -> None:
         super().__init__()
-        a, b, c, d = WIDTHS
+        a = WIDTHS[0]
         self.fold = nn.Sequential(
             nn.Conv2d(3, a, 4, 2, 1, bias=False), nn.BatchNorm2d(a), nn.ReLU(inplace=True)
         )
         self.down = nn.ModuleList()
-        for (before, here), depth in zip(((a, a), (a, b), (b, c), (c, d)), DEPTHS, strict=True):
-            first = Separable(before, here, 1 if before == here else 2)
+        for before, here, depth in zip((a, *WIDTHS), WIDTHS, DEPTHS, strict=False):
+            first = Separable(before, here, 1 if len(self.down) == 0 else 2)
             self.down.append(nn.Sequential(first, *(Separable(here, here) for _ in range(depth - 1))))
-        self.up = nn.ModuleList([Up(d, c), Up(c, b), Up(b, a)])
+        self.up = nn.ModuleList(
+            Up(deep, here) for deep, here in zip(WIDTHS[:0:-1], WIDTHS[-2::-1], strict=True)
+        )
         self.last = Separable(a, a)
-        shape = nn.Conv2d(a, 4, 3, padding=1)
+        shape = nn.Conv2d(a, 4, 1)
         nn.init.constant_(shape.bias, -3.0)  # type: ignore[arg-type]  # cracks are rare
         self.unfold = nn.Sequential(shape, nn.PixelShuffle(2))
 

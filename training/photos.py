@@ -1,4 +1,4 @@
-"""Crops to learn from: photos with masks, turned, scaled, relit, blurred, noisy."""
+"""Crops to learn from: photos with masks, turned, scaled, cracked, relit, blurred, noisy."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,8 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from skimage.morphology import skeletonize
 
-SIDE_PX = 160
+from training.cracks import DOUBTFUL, VISIBLE, cracks_on, seen
+
+SIDE_PX = 224
 ON_CRACK = 0.5  # share of the crops of a photo with a crack that are centred on it
+DRAWN = 0.25  # share of the crops of photos on which further cracks are drawn: real surfaces, known cracks
 FOLDS = 5
 
 Pixels = npt.NDArray[np.uint8]
@@ -19,16 +22,17 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Photo:
-    """rgb (H, W, 3); truth (H, W, 2) of 0/255: cracks, and their centrelines, three pixels wide."""
+    """rgb (H, W, 3); truth (H, W, 3), 0 or 255: crack, its centreline (3 px wide), whether it counts."""
 
     name: str
     rgb: Pixels
     truth: Pixels
     on_crack: npt.NDArray[np.int32]  # (n, 2) y, x of some pixels of the cracks
     scales: tuple[float, float]
+    drawn: float  # share of its crops on which cracks are drawn
 
 
-def read(folder: Path, names: list[str], scales: tuple[float, float]) -> list[Photo]:
+def read(folder: Path, names: list[str], scales: tuple[float, float], drawn: float = 0.0) -> list[Photo]:
     """The named photos of FOLDER/images with their masks of FOLDER/masks."""
     photos = []
     for name in names:
@@ -36,11 +40,11 @@ def read(folder: Path, names: list[str], scales: tuple[float, float]) -> list[Ph
         mask = cv2.imread(str(folder / "masks" / name), cv2.IMREAD_GRAYSCALE)
         if bgr is None or mask is None:
             raise SystemExit(f"{folder}: {name} or its mask cannot be read")
-        crack = (mask > 0).astype(np.uint8)
+        crack = ((mask > 0) & (mask != DOUBTFUL)).astype(np.uint8)
         line = cv2.dilate(np.asarray(skeletonize(crack > 0), np.uint8), np.ones((3, 3), np.uint8))
-        truth = 255 * np.dstack([crack, line])
+        truth = 255 * np.dstack([crack, line, (mask != DOUBTFUL).astype(np.uint8)])
         on_crack = np.argwhere(crack > 0)[::7].astype(np.int32)
-        photos.append(Photo(name, np.ascontiguousarray(bgr[..., ::-1]), truth, on_crack, scales))
+        photos.append(Photo(name, np.ascontiguousarray(bgr[..., ::-1]), truth, on_crack, scales, drawn))
     return photos
 
 
@@ -58,7 +62,7 @@ def by_fold(groups: Path) -> list[list[str]]:
 
 
 def crop(photo: Photo, rng: Rng) -> tuple[Floats, Floats]:
-    """(3, SIDE_PX, SIDE_PX) RGB in 0..1 and (2, SIDE_PX, SIDE_PX) truth, as drawn."""
+    """(3, SIDE_PX, SIDE_PX) RGB in 0..1 and (3, SIDE_PX, SIDE_PX) truth, as read() gives it."""
     height, width = photo.rgb.shape[:2]
     scale = float(np.exp(rng.uniform(*np.log(photo.scales))))
     if len(photo.on_crack) and rng.random() < ON_CRACK:
@@ -72,9 +76,21 @@ def crop(photo: Photo, rng: Rng) -> tuple[Floats, Floats]:
     A = np.array([[c * flip, -s, 0.0], [s * flip, c, 0.0]])
     A[:, 2] = SIDE_PX / 2 - A[:, :2] @ (x, y)
     rgb = photo.rgb if scale > 0.8 else _softened(photo.rgb, (x, y), scale)
-    seen = _seen(_warped(rgb, A).astype(np.float32) / np.float32(255.0), rng)
-    truth = _warped(photo.truth, A)
-    return seen.transpose(2, 0, 1), (truth > 110).astype(np.float32).transpose(2, 0, 1)
+    looks = _warped(rgb, A).astype(np.float32) / np.float32(255.0)
+    truth = (_warped(photo.truth, A) > 110).astype(np.float32)
+    if rng.random() < photo.drawn:
+        looks, truth = _cracked(looks, truth, rng)
+    return _relit(looks, rng).transpose(2, 0, 1), truth.transpose(2, 0, 1)
+
+
+def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:
+    """Further cracks across the crop, each lot as dark as one crack."""
+    share = seen(cracks_on(rng, SIDE_PX, 1.0), SIDE_PX, SIDE_PX, 1.0)
+    kept = np.exp(rng.uniform(np.log(0.12), np.log(0.88)))
+    crack = (share >= VISIBLE).astype(np.uint8)
+    line = cv2.dilate(np.asarray(skeletonize(crack > 0), np.uint8), np.ones((3, 3), np.uint8))
+    both = np.maximum(truth, np.dstack([crack, line, crack]))
+    return rgb * (1.0 - share * np.float32(1.0 - kept))[..., None], both
 
 
 def _warped(picture: Pixels, A: npt.NDArray[np.float64]) -> Pixels:
@@ -93,7 +109,7 @@ def _softened(rgb: Pixels, at: tuple[float, float], scale: float) -> Pixels:
     return soft
 
 
-def _seen(rgb: Floats, rng: Rng) -> Floats:
+def _relit(rgb: Floats, rng: Rng) -> Floats:
     """Another camera, another light."""
     if rng.random() < 0.3:
         y, x = np.mgrid[:SIDE_PX, :SIDE_PX].astype(np.float32) / SIDE_PX - 0.5

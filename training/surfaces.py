@@ -2,8 +2,8 @@
 
 Each is rendered through the simulator's camera with cracks of known width, or with none, and with much that
 looks like a crack: joints, cables, planks, bricks, pores, tie holes, stains, markers, shadows. The ranges are
-wider than any scene of the demo, and the cracks are drawn by code of their own: the demo's scenes stay
-unseen.
+wider than any scene of the demo, and the cracks are drawn by code of their own (training.cracks): the demo's
+scenes stay unseen.
 """
 
 import sys
@@ -22,14 +22,11 @@ from tasks.simulation.light import LightMap
 from tasks.simulation.marks import Shapes, discs, in_cells, line, painted_box, painted_disc, segments
 from tasks.simulation.sensor import automatic_gain, develop
 from tasks.simulation.skin import Floats, Rgb, Skin, blotch, fine_grain, streak
+from training.cracks import DOUBTFUL, VISIBLE, Cracks, cracks_on, one_crack, seen, walk
 
 SIDE_PX = 640
 FOCAL_PX = 4000.0
-STEP_PX = 1.0  # between the points of a crack
-SUPERSAMPLED = 8  # of the truth, along each axis
-VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
 CRACK_FREE = 0.35  # share of surfaces without any crack
-SMOOTH = 0.5  # share of cracks without roughness
 TEXEL_PX = 2.0
 
 Array = npt.NDArray[np.float64]
@@ -37,13 +34,15 @@ Rng = np.random.Generator
 
 
 def surface(seed: int, crack_free: bool = False) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
-    """(SIDE_PX, SIDE_PX, 3) uint8 RGB photo of a surface and its (SIDE_PX, SIDE_PX) truth, 255 on cracks."""
+    """(SIDE_PX, SIDE_PX, 3) uint8 RGB photo of a surface and its (SIDE_PX, SIDE_PX) truth: 255 on cracks,
+    DOUBTFUL on what nobody could tell from one."""
     rng = np.random.default_rng([seed, 0x547261696E])
     px_m = float(np.exp(rng.uniform(np.log(0.0003), np.log(0.0015))))
     side_m = 1.04 * SIDE_PX * px_m
     face = Face("board", (-side_m / 2, 0.0, -side_m / 2), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), side_m, side_m)
-    cracks = () if rng.random() < (1.0 if crack_free else CRACK_FREE) else _cracks(rng, side_m, px_m)
-    skin = _skin(rng, seed, face, px_m, cracks)
+    cracks = () if rng.random() < (1.0 if crack_free else CRACK_FREE) else cracks_on(rng, side_m, px_m)
+    wires = _wires(rng, side_m, px_m)
+    skin = _skin(rng, seed, face, px_m, cracks, wires)
     camera = Camera(width_px=SIDE_PX, height_px=SIDE_PX, focal_px=FOCAL_PX)
     pose = CameraPose(position_m=(0.0, -FOCAL_PX * px_m, 0.0), yaw_deg=0.0, pitch_deg=0.0)
     speed_m_s = rng.normal(0.0, 0.5, 3) * px_m / camera.shutter_s
@@ -51,7 +50,9 @@ def surface(seed: int, crack_free: bool = False) -> tuple[npt.NDArray[np.uint8],
     light = LightMap(_light(rng), side_m / 511)
     gathered = expose(camera, pose, motion, FaceArrays.of((face,)), lambda _: (skin, light))
     rgb = develop(gathered, camera, automatic_gain(gathered) * float(np.exp(rng.normal(0.1, 0.3))), rng)
-    return _compressed(rgb, int(rng.integers(70, 96))), _truth(cracks, side_m, px_m)
+    truth = np.where(seen(wires, SIDE_PX, side_m, px_m) > 0.02, DOUBTFUL, 0)
+    truth[seen(cracks, SIDE_PX, side_m, px_m) >= VISIBLE] = 255
+    return _compressed(rgb, int(rng.integers(70, 96))), truth.astype(np.uint8)
 
 
 def _compressed(rgb: npt.NDArray[np.uint8], quality: int) -> npt.NDArray[np.uint8]:
@@ -59,89 +60,10 @@ def _compressed(rgb: npt.NDArray[np.uint8], quality: int) -> npt.NDArray[np.uint
     return np.ascontiguousarray(np.asarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR), dtype=np.uint8)[..., ::-1])
 
 
-def _truth(cracks: tuple[CrackShape, ...], side_m: float, px_m: float) -> npt.NDArray[np.uint8]:
-    """Where cracks darken the photo: their area through the photosites' own size and the lens's blur."""
-    fine = np.zeros((SIDE_PX * SUPERSAMPLED, SIDE_PX * SUPERSAMPLED), np.uint8)
-    for crack in cracks:
-        along = np.gradient(crack.uv_m, axis=0)
-        normal = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-        left = crack.uv_m + normal * crack.left_m[:, None]
-        right = crack.uv_m - normal * crack.right_m[:, None]
-        for i in range(len(left) - 1):
-            quad = np.array([left[i], left[i + 1], right[i + 1], right[i]])
-            x = (quad[:, 0] - side_m / 2) / px_m + (SIDE_PX - 1) / 2
-            y = (SIDE_PX - 1) / 2 - (quad[:, 1] - side_m / 2) / px_m
-            points = np.column_stack([x + 0.5, y + 0.5]) * SUPERSAMPLED - 0.5
-            cv2.fillConvexPoly(fine, np.rint(points * 16).astype(np.int32), 255, shift=4)
-    share = cv2.resize(fine, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
-    seen = cv2.GaussianBlur(share, (0, 0), 0.7)
-    return np.where(seen >= VISIBLE, 255, 0).astype(np.uint8)
-
-
-# Cracks
-
-
-def _cracks(rng: Rng, side_m: float, px_m: float) -> tuple[CrackShape, ...]:
-    cracks: list[CrackShape] = []
-    for _ in range(int(rng.choice([1, 2, 3, 6], p=[0.4, 0.3, 0.2, 0.1]))):
-        trunk = _crack(rng, rng.uniform(0.05, 0.95, 2) * side_m, rng.uniform(0, 2 * np.pi), side_m, px_m)
-        cracks.append(trunk)
-        for _ in range(rng.poisson(0.7)):
-            at = int(rng.uniform(0.1, 0.9) * (len(trunk.uv_m) - 10))
-            along = trunk.uv_m[at + 9] - trunk.uv_m[at]
-            away = float(np.arctan2(along[1], along[0])) + rng.choice([-1, 1]) * rng.uniform(0.4, 1.4)
-            cracks.append(_crack(rng, trunk.uv_m[at], away, side_m, px_m, trunk))
-    return tuple(cracks)
-
-
-def _crack(
-    rng: Rng, start: Array, heading: float, side_m: float, px_m: float, trunk: CrackShape | None = None
-) -> CrackShape:
-    n = int(rng.uniform(80, 700) if trunk is None else rng.uniform(40, 250))
-    smooth = rng.random() < SMOOTH  # seen from near, a crack bends slowly: no roughness at the pixels' scale
-    turn = np.radians(rng.uniform(5, 40))
-    jitter = np.radians(rng.uniform(0, 6) if smooth else rng.uniform(6, 35))
-    bends_px = float(np.exp(rng.uniform(np.log(15), np.log(200))))
-    path = heading + turn * _walk(rng, n, bends_px) + jitter * _walk(rng, n, 3.0)
-    uv = start + STEP_PX * px_m * np.cumsum(np.column_stack([np.cos(path), np.sin(path)]), axis=0)
-    inside = np.flatnonzero(((uv < 0) | (uv > side_m)).any(axis=1))
-    n = int(inside[0]) if len(inside) else n
-    n = max(n, 10)
-    width_px = (
-        float(np.exp(rng.uniform(np.log(0.7), np.log(14.0))))
-        if rng.random() < 0.35
-        else (float(rng.uniform(0.8, 4.5)))
-    )
-    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.8))))
-    if trunk is not None:
-        width_px = float(np.median(trunk.left_m + trunk.right_m)) / px_m * rng.uniform(0.35, 0.9)
-        kept = float(trunk.kept_light.mean())
-    s = np.linspace(0.0, 1.0, n)
-    taper = np.minimum(1.0, (1.0 - s) / rng.uniform(0.05, 0.5)) ** 0.7
-    if trunk is None and rng.random() < 0.7:
-        taper *= np.minimum(1.0, s / rng.uniform(0.05, 0.4)) ** 0.7
-    width = width_px * px_m * taper * np.exp(rng.uniform(0.1, 0.4) * _walk(rng, n, rng.uniform(10, 60)))
-    for _ in range(rng.poisson(0.8)):  # healed or filled for a stretch
-        at, reach = rng.uniform(0, n), rng.uniform(3, 25)
-        width *= 1.0 - rng.uniform(0.4, 1.0) * np.exp(-(((np.arange(n) - at) / reach) ** 2))
-    rough = rng.uniform(0.0, 0.03) if smooth else rng.uniform(0.02, 0.15)
-    left, right = (np.maximum(width * (0.5 + rough * _walk(rng, n, 1.5)), 0.0) for _ in range(2))
-    light = np.clip(kept + 0.06 * _walk(rng, n, 40.0), 0.05, 0.85)
-    return CrackShape("c", None, uv[:n], left, right, light)
-
-
-def _walk(rng: Rng, n: int, length: float) -> Array:
-    """(n,) Gaussian noise of unit variance, correlated over `length` samples."""
-    pad = int(4 * length) + 2
-    noise = cv2.GaussianBlur(rng.standard_normal((n + 2 * pad, 1)), (1, 0), sigmaX=1e-6, sigmaY=length)
-    noise = noise if noise.ndim == 1 else noise[:, 0]
-    return np.asarray(noise[pad : pad + n] * np.sqrt(2 * np.sqrt(np.pi) * length))
-
-
 # Surfaces
 
 
-def _skin(rng: Rng, seed: int, face: Face, px_m: float, cracks: tuple[CrackShape, ...]) -> Skin:
+def _skin(rng: Rng, seed: int, face: Face, px_m: float, cracks: Cracks, wires: Cracks) -> Skin:
     kind = rng.choice(["cast", "rough", "smooth", "wood", "brick"], p=[0.45, 0.2, 0.15, 0.1, 0.1])
     rms = {"cast": 0.06, "rough": 0.12, "smooth": 0.025, "wood": 0.03, "brick": 0.07}[kind]
     rms *= float(np.exp(rng.normal(0, 0.25)))
@@ -166,8 +88,8 @@ def _skin(rng: Rng, seed: int, face: Face, px_m: float, cracks: tuple[CrackShape
     _stains(rng, tone, texel_m, side_m, px_m)
     tone = np.ascontiguousarray(np.clip(tone, 0.01, 0.95))
     shapes += _pores(rng, side_m, px_m)
-    shapes += [crack.shapes for crack in cracks if len(crack.uv_m) > 1]
-    shapes += _things(rng, side_m, px_m)
+    shapes += [crack.shapes for crack in (*cracks, *wires) if len(crack.uv_m) > 1]
+    shapes += _cables(rng, side_m, px_m) + _things(rng, side_m, px_m)
     grain, grain_texel_m = fine_grain(seed % 8, rms, stretch)
     turn_deg = 3.0 if kind == "wood" else 33.0
     return Skin(tone, texel_m, grain, grain_texel_m * scale, turn_deg, in_cells(shapes, side_m, side_m))
@@ -181,13 +103,17 @@ def _through(rng: Rng, side_m: float, angle_rad: float) -> tuple[Array, Array]:
 
 
 def _straight(start: Array, end: Array, width_m: float, kept: float, bow_m: float = 0.0) -> Shapes:
+    return _bowed(start, end, width_m, kept, bow_m).shapes
+
+
+def _bowed(start: Array, end: Array, width_m: float, kept: float, bow_m: float) -> CrackShape:
     """A line in short pieces, so that only the cells along it know it; bow_m: sag in the middle."""
     t = np.linspace(0.0, 1.0, 160)
     along = (end - start) / np.linalg.norm(end - start)
     uv = start + t[:, None] * (end - start)
     uv += (bow_m * 4 * t * (1 - t))[:, None] * np.array([-along[1], along[0]])
     half = np.full(len(t), width_m / 2)
-    return segments(uv, half, half, np.full(len(t), kept))
+    return CrackShape("line", None, uv, half, half, np.full(len(t), kept))
 
 
 def _joints(rng: Rng, tone: Floats, side_m: float, px_m: float, texel_m: float) -> list[Shapes]:
@@ -238,7 +164,7 @@ def _stains(rng: Rng, tone: Floats, texel_m: float, side_m: float, px_m: float) 
     for _ in range(rng.poisson(0.5)):  # spalls and repairs: patches with a sharp, ragged edge
         centre = rng.uniform(0, side_m, 2) / texel_m
         angle = np.linspace(0, 2 * np.pi, 120, endpoint=False)
-        radius = rng.uniform(15, 90) / TEXEL_PX * (1 + 0.25 * _walk(rng, 120, 6.0))
+        radius = rng.uniform(15, 90) / TEXEL_PX * (1 + 0.25 * walk(rng, 120, 6.0))
         outline = centre + radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         patch = np.zeros(tone.shape[:2], np.uint8)
         cv2.fillPoly(patch, [np.rint(outline).astype(np.int32)], 1)
@@ -258,12 +184,22 @@ def _pores(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
     return shapes
 
 
-def _things(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
-    """What lies on top: cables, chalk, markers, scratches."""
-    shapes: list[Shapes] = []
-    for _ in range(rng.poisson(0.35)):  # a cable or wire: round, so it shines along one side; its shadow
+def _wires(rng: Rng, side_m: float, px_m: float) -> Cracks:
+    """Wires and cables so thin that their roundness does not show: dark, smooth, as wide everywhere."""
+    wires = []
+    for _ in range(rng.poisson(0.15)):
         start, end = _through(rng, side_m, rng.uniform(0, np.pi))
-        bow, wide = rng.normal(0, 0.04) * side_m, rng.uniform(1.5, 9.0) * px_m
+        bow_m, wide_m = rng.normal(0, 0.04) * side_m, rng.uniform(1.0, 4.0) * px_m
+        wires.append(_bowed(start, end, wide_m, float(rng.uniform(0.1, 0.6)), bow_m))
+    return tuple(wires)
+
+
+def _cables(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
+    """Round ones: they shine along one side and may throw a shadow beside them."""
+    shapes = []
+    for _ in range(rng.poisson(0.25)):
+        start, end = _through(rng, side_m, rng.uniform(0, np.pi))
+        bow, wide = rng.normal(0, 0.04) * side_m, rng.uniform(4.0, 14.0) * px_m
         across = np.array([-(end - start)[1], (end - start)[0]]) / np.linalg.norm(end - start) * wide
         shapes.append(_straight(start, end, wide, float(rng.uniform(0.08, 0.5)), bow))
         shine = rng.uniform(-0.35, 0.35) * across
@@ -271,8 +207,14 @@ def _things(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
         if rng.random() < 0.4:
             off = rng.uniform(1.2, 4.0) * across
             shapes.append(_straight(start + off, end + off, wide, float(rng.uniform(0.5, 0.8)), bow))
+    return shapes
+
+
+def _things(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
+    """What lies on top: chalk, markers, scratches."""
+    shapes: list[Shapes] = []
     for _ in range(rng.poisson(0.5)):  # chalk and scratches: bright, and wandering like a crack
-        mark = _crack(rng, rng.uniform(0, side_m, 2), rng.uniform(0, 2 * np.pi), side_m, px_m)
+        mark = one_crack(rng, rng.uniform(0, side_m, 2), rng.uniform(0, 2 * np.pi), side_m, px_m)
         if len(mark.uv_m) > 1:
             bright = np.full(len(mark.uv_m), rng.uniform(1.15, 2.0))
             shapes.append(segments(mark.uv_m, mark.left_m, mark.right_m, bright))

@@ -20,20 +20,21 @@ from torch import Tensor
 from torch.nn import functional
 
 from training.network import Network
-from training.photos import Photo, by_fold, crop, read
+from training.photos import DRAWN, Photo, by_fold, crop, read
 
-BATCH = 8  # half of it photos, half surfaces
+BATCH = 6  # half of it photos, half surfaces
 RATE, WARM_UP, DECAY = 3e-3, 300, 1e-3
-AVERAGED = 0.998  # weights are averaged over about 1 / (1 − AVERAGED) steps: these are judged and kept
-EVERY = 500  # steps between checkpoints
+AVERAGED = 0.999  # weights are averaged over about 1 / (1 − AVERAGED) steps: these are judged and kept
+EVERY = 1000  # steps between checkpoints
 
 
 def loss_of(logit: Tensor, truth: Tensor) -> Tensor:
     """Cross entropy for calibrated probabilities, Dice for areas, and recall of centrelines: a crack that is
-    cut costs as much where it is thin as where it is wide. logit (N, 1, H, W), truth (N, 2, H, W)."""
-    crack, line = truth[:, :1], truth[:, 1:]
-    entropy = functional.binary_cross_entropy_with_logits(logit, crack)
-    p = torch.sigmoid(logit)
+    cut costs as much where it is thin as where it is wide. logit (N, 1, H, W), truth (N, 3, H, W): crack,
+    centreline, and 0 where no answer is wrong."""
+    crack, line, judged = truth[:, :1], truth[:, 1:2], truth[:, 2:]
+    entropy = functional.binary_cross_entropy_with_logits(logit, crack, weight=judged)
+    p = judged * torch.sigmoid(logit)
     dice = 1.0 - (2.0 * (p * crack).sum() + 1.0) / (p.sum() + crack.sum() + 1.0)
     missed = 1.0 - ((p * line).sum() + 1.0) / (line.sum() + 1.0)
     return 4.0 * entropy + 0.3 * dice + 0.1 * missed
@@ -54,7 +55,7 @@ def batch(photos: list[Photo], surfaces: list[Photo], seed: int) -> tuple[Tensor
 def probabilities(net: Network, rgb: np.ndarray) -> np.ndarray:
     """(H, W) float32 of an (H, W, 3) uint8 photo."""
     height, width = rgb.shape[:2]
-    padded = cv2.copyMakeBorder(rgb, 0, -height % 16, 0, -width % 16, cv2.BORDER_REFLECT_101)
+    padded = cv2.copyMakeBorder(rgb, 0, -height % 32, 0, -width % 32, cv2.BORDER_REFLECT_101)
     x = torch.from_numpy(np.ascontiguousarray(padded.transpose(2, 0, 1))[None]).float() / 255.0
     out: np.ndarray = torch.sigmoid(net(x))[0, 0, :height, :width].numpy()
     return out
@@ -79,7 +80,7 @@ def main() -> None:
     parser.add_argument("surfaces", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--fold", type=int)
-    parser.add_argument("--steps", type=int, default=10000)
+    parser.add_argument("--steps", type=int, default=60000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--start", type=Path)
     parser.add_argument("--rate", type=float, default=RATE)
@@ -91,7 +92,7 @@ def main() -> None:
     folds = by_fold(args.photos / "groups.txt")
     left_out = [] if args.fold is None else folds[args.fold]
     kept = [name for fold in folds for name in fold if name not in left_out]
-    photos = read(args.photos, kept, (0.5, 3.0))
+    photos = read(args.photos, kept, (0.5, 3.0), DRAWN)
     held = read(args.photos, left_out, (1.0, 1.0))
     surfaces = read(args.surfaces, sorted(p.name for p in (args.surfaces / "masks").iterdir()), (0.7, 2.0))
 
@@ -122,7 +123,7 @@ def main() -> None:
             if step % EVERY == 0 or step == args.steps:
                 torch.save(averaged.state_dict(), args.out / "weights.pt")
                 minutes = (time.monotonic() - began) / 60
-                held_out = judged(averaged, held) if held and step % (2 * EVERY) == 0 else ""
+                held_out = judged(averaged, held) if held and step % (3 * EVERY) == 0 else ""
                 print(f"{step} {minutes:.1f} min, loss {total / EVERY:.4f} {held_out}", flush=True)
                 total = 0.0
 

@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tasks.simulation.crack import CrackShape
 from tests.development_data import development_data
 from training import surfaces
-from training.photos import ON_CRACK, SIDE_PX, Photo, by_fold, crop
-from training.surfaces import surface
+from training.cracks import DOUBTFUL, seen
+from training.photos import ON_CRACK, SIDE_PX, Photo, by_fold, crop, read
+from training.surfaces import main, surface
 
 
 def test_truth_lies_where_a_crack_is_dark(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -18,10 +20,42 @@ def test_truth_lies_where_a_crack_is_dark(monkeypatch: pytest.MonkeyPatch) -> No
     rgb, truth = surface(seed)
     assert rgb.shape == (320, 320, 3) and truth.any()
     kept = surfaces._skin
-    monkeypatch.setattr(surfaces, "_skin", lambda rng, seed, face, px, cracks: kept(rng, seed, face, px, ()))
+    monkeypatch.setattr(
+        surfaces, "_skin", lambda rng, seed, face, px, _, __: kept(rng, seed, face, px, (), ())
+    )
     bare, _ = surface(seed)
     darker = bare.astype(int).sum(axis=2) - rgb.astype(int).sum(axis=2)
-    assert darker[truth > 0].mean() > 5 * np.abs(darker[truth == 0]).mean()
+    assert darker[truth == 255].mean() > 5 * np.abs(darker[truth == 0]).mean()
+
+
+def test_a_wire_counts_neither_as_crack_nor_as_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(surfaces, "SIDE_PX", 320)
+    wired = next(s for s in range(60) if (surface(s, crack_free=True)[1] == DOUBTFUL).any())
+    main(tmp_path, 1, wired)
+    (photo,) = read(tmp_path, [f"{wired:05d}.png"], (1.0, 1.0))
+    doubtful = surface(wired)[1] == DOUBTFUL
+    assert ((photo.truth[..., 2] == 0) == doubtful).all() and not photo.truth[doubtful, :2].any()
+
+
+def test_a_crack_covers_as_much_as_it_is_wide() -> None:
+    """The shares that pixels see of cracks add up to the cracks' area, in pixels."""
+    u = np.linspace(20.3, 80.7, 200)
+    half = np.linspace(0.2, 1.5, 200)
+    one = CrackShape("c", None, np.column_stack([u, np.full(200, 50.4)]), half, half, half)
+    assert seen((one,), 100, 100.0, 1.0).sum() == pytest.approx(60.4 * 1.7, rel=0.02)
+
+
+def test_a_crack_drawn_on_a_photo_is_dark_and_true() -> None:
+    rgb = np.full((300, 300, 3), 180, np.uint8)
+    truth = np.zeros((300, 300, 3), np.uint8)
+    truth[..., 2] = 255
+    photo = Photo("bare", rgb, truth, np.zeros((0, 2), np.int32), (1.0, 1.0), drawn=1.0)
+    contrast = []
+    for seed in range(20):
+        looks, mask = crop(photo, np.random.default_rng(seed))
+        assert mask[2].all() and mask[0].any()
+        contrast.append(looks[:, mask[0] == 0].mean() - looks[:, mask[1] > 0].mean())
+    assert np.median(contrast) > 0.1
 
 
 def test_groups_of_one_photo_never_part(tmp_path: Path) -> None:
@@ -42,15 +76,15 @@ def test_folds_of_the_real_set_are_even() -> None:
 def test_a_crop_keeps_truth_on_its_crack() -> None:
     """However turned, scaled and relit: the truth stays on the dark line."""
     rgb = np.full((300, 300, 3), 180, np.uint8)
-    truth = np.zeros((300, 300, 2), np.uint8)
+    truth = np.full((300, 300, 3), [0, 0, 255], np.uint8)
     rgb[148:153], truth[148:153] = 30, 255
     on_crack = np.argwhere(truth[..., 0] > 0).astype(np.int32)
-    photo = Photo("line", rgb, truth, on_crack, (0.5, 2.0))
+    photo = Photo("line", rgb, truth, on_crack, (0.5, 2.0), 0.0)
     contrast = []
     for seed in range(30):
-        seen, mask = crop(photo, np.random.default_rng(seed))
-        assert seen.shape == (3, SIDE_PX, SIDE_PX) and mask.shape == (2, SIDE_PX, SIDE_PX)
-        assert seen.min() >= 0.0 and seen.max() <= 1.0
+        looks, mask = crop(photo, np.random.default_rng(seed))
+        assert looks.shape == (3, SIDE_PX, SIDE_PX) and mask.shape == (3, SIDE_PX, SIDE_PX)
+        assert looks.min() >= 0.0 and looks.max() <= 1.0
         if mask[0].sum() > 100:
-            contrast.append(seen[:, mask[0] == 0].mean() - seen[:, mask[0] > 0].mean())
+            contrast.append(looks[:, mask[0] == 0].mean() - looks[:, mask[0] > 0].mean())
     assert len(contrast) > 30 * ON_CRACK * 0.7 and np.median(contrast) > 0.15

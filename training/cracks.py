@@ -1,0 +1,94 @@
+"""Cracks to learn from: drawn wider in range than those of any scene, and where a photo shows them."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tasks.simulation.crack import CrackShape
+
+STEP_PX = 1.0  # between the points of a crack
+SUPERSAMPLED = 8  # of the truth, along each axis
+VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
+SMOOTH = 0.5  # share of cracks without roughness
+DOUBTFUL = 128  # in a truth: no answer is wrong here
+
+Array = npt.NDArray[np.float64]
+Rng = np.random.Generator
+Cracks = tuple[CrackShape, ...]
+
+
+def seen(cracks: Cracks, side_px: int, side_m: float, px_m: float) -> npt.NDArray[np.float32]:
+    """(side_px, side_px) share of each pixel that cracks cover, through photosite and lens."""
+    fine = np.zeros((side_px * SUPERSAMPLED, side_px * SUPERSAMPLED), np.uint8)
+    rim_m = 0.5 / SUPERSAMPLED * px_m  # OpenCV fills the pixels on a polygon's outline too
+    for crack in cracks:
+        along = np.gradient(crack.uv_m, axis=0)
+        normal = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+        left_m, right_m = (np.maximum(w - rim_m, 0.0)[:, None] for w in (crack.left_m, crack.right_m))
+        left, right = crack.uv_m + normal * left_m, crack.uv_m - normal * right_m
+        quads = np.stack([left[:-1], left[1:], right[1:], right[:-1]], axis=1)
+        x = (quads[..., 0] - side_m / 2) / px_m + (side_px - 1) / 2
+        y = (side_px - 1) / 2 - (quads[..., 1] - side_m / 2) / px_m
+        points = np.rint(16 * ((np.stack([x, y], axis=-1) + 0.5) * SUPERSAMPLED - 0.5)).astype(np.int32)
+        for quad in points:
+            cv2.fillConvexPoly(fine, quad, 255, shift=4)
+    share = cv2.resize(fine, (side_px, side_px), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
+    return np.asarray(cv2.GaussianBlur(share, (0, 0), 0.7), np.float32)
+
+
+def cracks_on(rng: Rng, side_m: float, px_m: float) -> Cracks:
+    """Some cracks with their branches on a square of side_m whose photo has pixels of px_m."""
+    cracks: list[CrackShape] = []
+    for _ in range(int(rng.choice([1, 2, 3, 6], p=[0.4, 0.3, 0.2, 0.1]))):
+        trunk = one_crack(rng, rng.uniform(0.05, 0.95, 2) * side_m, rng.uniform(0, 2 * np.pi), side_m, px_m)
+        cracks.append(trunk)
+        for _ in range(rng.poisson(0.7)):
+            at = int(rng.uniform(0.1, 0.9) * (len(trunk.uv_m) - 10))
+            along = trunk.uv_m[at + 9] - trunk.uv_m[at]
+            away = float(np.arctan2(along[1], along[0])) + rng.choice([-1, 1]) * rng.uniform(0.4, 1.4)
+            cracks.append(one_crack(rng, trunk.uv_m[at], away, side_m, px_m, trunk))
+    return tuple(cracks)
+
+
+def one_crack(
+    rng: Rng, start: Array, heading: float, side_m: float, px_m: float, trunk: CrackShape | None = None
+) -> CrackShape:
+    n = int(rng.uniform(80, 700) if trunk is None else rng.uniform(40, 250))
+    smooth = rng.random() < SMOOTH  # seen from near, a crack bends slowly: no roughness at the pixels' scale
+    turn = np.radians(rng.uniform(5, 40))
+    jitter = np.radians(rng.uniform(0, 6) if smooth else rng.uniform(6, 35))
+    bends_px = float(np.exp(rng.uniform(np.log(15), np.log(200))))
+    path = heading + turn * walk(rng, n, bends_px) + jitter * walk(rng, n, 3.0)
+    uv = start + STEP_PX * px_m * np.cumsum(np.column_stack([np.cos(path), np.sin(path)]), axis=0)
+    inside = np.flatnonzero(((uv < 0) | (uv > side_m)).any(axis=1))
+    n = int(inside[0]) if len(inside) else n
+    n = max(n, 10)
+    width_px = (
+        float(np.exp(rng.uniform(np.log(0.7), np.log(14.0))))
+        if rng.random() < 0.35
+        else (float(rng.uniform(0.8, 4.5)))
+    )
+    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.8))))
+    if trunk is not None:
+        width_px = float(np.median(trunk.left_m + trunk.right_m)) / px_m * rng.uniform(0.35, 0.9)
+        kept = float(trunk.kept_light.mean())
+    s = np.linspace(0.0, 1.0, n)
+    taper = np.minimum(1.0, (1.0 - s) / rng.uniform(0.05, 0.5)) ** 0.7
+    if trunk is None and rng.random() < 0.7:
+        taper *= np.minimum(1.0, s / rng.uniform(0.05, 0.4)) ** 0.7
+    width = width_px * px_m * taper * np.exp(rng.uniform(0.1, 0.4) * walk(rng, n, rng.uniform(10, 60)))
+    for _ in range(rng.poisson(0.8)):  # healed or filled for a stretch
+        at, reach = rng.uniform(0, n), rng.uniform(3, 25)
+        width *= 1.0 - rng.uniform(0.4, 1.0) * np.exp(-(((np.arange(n) - at) / reach) ** 2))
+    rough = rng.uniform(0.0, 0.03) if smooth else rng.uniform(0.02, 0.15)
+    left, right = (np.maximum(width * (0.5 + rough * walk(rng, n, 1.5)), 0.0) for _ in range(2))
+    light = np.clip(kept + 0.06 * walk(rng, n, 40.0), 0.05, 0.85)
+    return CrackShape("c", None, uv[:n], left, right, light)
+
+
+def walk(rng: Rng, n: int, length: float) -> Array:
+    """(n,) Gaussian noise of unit variance, correlated over `length` samples."""
+    pad = int(4 * length) + 2
+    noise = cv2.GaussianBlur(rng.standard_normal((n + 2 * pad, 1)), (1, 0), sigmaX=1e-6, sigmaY=length)
+    noise = noise if noise.ndim == 1 else noise[:, 0]
+    return np.asarray(noise[pad : pad + n] * np.sqrt(2 * np.sqrt(np.pi) * length))
