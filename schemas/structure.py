@@ -50,18 +50,29 @@ class Structure(Contract):
         return anchored([self._of_the_model(point) for point in points])
 
     def _of_the_model(self, point: KnownPoint) -> KnownPoint:
-        x, y, z = (a - b for a, b in zip(point.model_m, self.world_origin_m, strict=True))
-        shifted = point.model_copy(update={"model_m": (x, y, z)})
-        nearest = min((point, shifted), key=self._away_m)
-        if self._away_m(nearest) > FARTHEST_M:
+        (here,) = self.here("anchors", (point.model_m,))
+        return point.model_copy(update={"model_m": here})
+
+    def here(self, stated: str, places_m: Sequence[Vector3]) -> tuple[Vector3, ...]:
+        """The corners of something that somebody stated, in the model's coordinates: as they are or, where
+        the model was shifted and they lie nearer then, as the scans have them. BadInput, naming `stated`, for
+        what lies far from the model either way."""
+        shifted = tuple(_less(place, self.world_origin_m) for place in places_m)
+        nearest = min((tuple(places_m), shifted), key=self._away_m)
+        if (away_m := self._away_m(nearest)) > FARTHEST_M:
             raise BadInput(
-                "anchors",
-                f"a known point, {point.model_m}, lies {self._away_m(nearest) / 1000:,.0f} km from the model",
-                "Give model_m in metres, in the coordinates of the scans",
+                stated,
+                f"what was given at {places_m[0]} lies {away_m / 1000:,.0f} km from the model",
+                "Give metres in the coordinates of the scans",
             )
         return nearest
 
-    def _away_m(self, point: KnownPoint) -> float:
-        """From the scanned world, as if it were a box."""
-        outside = zip(self.min_m, point.model_m, self.max_m, strict=True)
-        return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in outside))
+    def _away_m(self, corners_m: Sequence[Vector3]) -> float:
+        """From the scanned world, both taken for boxes."""
+        box = zip(*corners_m, strict=True)
+        outside = zip(self.min_m, ((min(axis), max(axis)) for axis in box), self.max_m, strict=True)
+        return math.hypot(*(max(low - far, near - high, 0.0) for low, (near, far), high in outside))
+
+
+def _less(a: Vector3, b: Vector3) -> Vector3:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

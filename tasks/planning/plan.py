@@ -29,6 +29,7 @@ from tasks.planning.refusals import left_out, no_way, nothing_to_shoot
 from tasks.planning.request import check_camera, chosen_surfaces, planned_stand_off_m
 from tasks.planning.route import Stop, Ways, flying_order
 from tasks.planning.sight import Scene
+from tasks.planning.stated_places import in_the_model
 from tasks.planning.timing import duration_s, path_length_m
 from tasks.planning.tour import to_and_fro
 from tasks.planning.viewpoints import View, Views, shooting_grid, shooting_points, widened_overlap
@@ -65,6 +66,7 @@ def plan_and_prove(
     Raises BadInput where nothing can be flown, with what would make it possible; a surface that cannot be
     photographed while others can is left out and listed.
     """
+    settings, home_m = in_the_model(structure, settings, home_m)
     if cracks:
         surfaces = close_ups(structure.surfaces, cracks)
     else:

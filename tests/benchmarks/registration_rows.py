@@ -4,6 +4,7 @@ Each seed is a bridge of its own noise, trees and positions, scanned from nine s
 each). Peers and settings are in registration_peers.py. A time is CPU seconds on one core.
 """
 
+import resource
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,6 +38,7 @@ from tests.benchmarks.surveys import (
     pose_errors,
     registered,
     survey,
+    viaduct,
 )
 from tests.benchmarks.table import Row, row
 
@@ -47,6 +49,7 @@ GROWTH_STEPS_DEG = (0.6, 0.42, 0.3, 0.21)
 COARSE_STEP_DEG = 0.6  # where only yes or no is asked
 RIGHT_DEG, RIGHT_M = 1.0, 0.3
 EVERY = 4  # one pair of so many is placed blindly by peers too
+LOOKS = 50  # so that a scan has some 20 million points
 TARGETS = 8
 TARGET_SIGMA_M = 0.001  # of a target's centre in a scan
 IN_99 = 16.81  # of χ² with six degrees of freedom
@@ -239,6 +242,26 @@ def growth() -> Iterator[Row]:
     yield row("growth of CPU time with pairs", _slope(pairs, seconds), "exponent", "≤ 1.15", data, "1")
 
 
+def fifty_stations() -> Iterator[Row]:
+    """As many points as a crew brings at most: run alone, since the memory is the process's."""
+    with TemporaryDirectory() as name:
+        scanning = Scanning(step_deg=STEP_DEG)
+        case = survey(viaduct(1, 50), scanning, Path(name), looks=LOOKS)
+        found, T, cpu_s = registered(case)
+        errors = pose_errors(T, case)
+    points = sum(s.points for s in found.stations)
+    known: dict[str, Any] = {
+        "data": f"simulated viaduct, {len(case.given)} stations, {points / 1e6:.0f} million points",
+        "seed": "1",
+    }
+    gib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    yield row("fifty stations: peak memory", gib, "GiB", "≤ 8", **known)
+    yield row("fifty stations: stations lost", len(found.left_out), "stations", "≤ 0", **known)
+    yield row("fifty stations: check points", errors.check_mm, "mm RMSE", "≤ 2", **known)
+    yield row("fifty stations: worst station", max(errors.station_mm.values()), "mm", "≤ 2", **known)
+    yield row("fifty stations: CPU time", cpu_s, "s", None, **known)
+
+
 PARTS = {
     "known-positions": known_positions,
     "targets": targets,
@@ -248,6 +271,7 @@ PARTS = {
     "wrong-pose": wrong_pose,
     "refusals": refusals,
     "growth": growth,
+    "fifty-stations": fifty_stations,
 }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from artifacts.store import digest
+from schemas.contract import Vector3
 from schemas.file import File
 from schemas.scan import Scan
 from schemas.scanning import Scanning
@@ -23,7 +24,9 @@ from tasks.simulation.scene import Scene
 
 SETTINGS = RegistrationSettings()
 MORE_STATIONS_M = ((-10.5, -1.0, 1.65), (10.5, 1.5, 1.6), (0.5, -7.0, 1.7))  # of the bridge, in its frame
+SPAN_M = 12.6
 LOOSE = ("ground", "leaf", "metal")  # materials of what is no structure
+LOOK_SIGMA_M = 0.002
 CHECK_POINTS = 400  # of each station
 
 
@@ -56,21 +59,46 @@ def nine_station_bridge(seed: int) -> Scene:
     return replace(scene, stations_m=(*scene.stations_m, *more))
 
 
-def survey(scene: Scene, scanning: Scanning, folder: Path, prefix: str = "") -> Survey:
-    """The scene scanned from all its stations into PLY files of the folder."""
+def viaduct(seed: int, stations: int) -> Scene:
+    """The bridge many times over, one span beside the next, and stations along it, nine or so a span."""
+    scene = nine_station_bridge(seed)
+    along = bridge.PLACE.point((SPAN_M, 0.0, 0.0)) - np.asarray(bridge.PLACE.point((0.0, 0.0, 0.0)))
+    spans = -(-stations // len(scene.stations_m))
+    ground, *span = sorted(scene.faces, key=lambda face: face.material != "ground")
+    faces = [replace(ground, width_m=ground.width_m + spans * SPAN_M)]
+    for k in range(spans):
+        faces += [replace(f, name=f"{f.name}-{k}", origin_m=_moved(f.origin_m, k * along)) for f in span]
+    places = [_moved(place, k * along) for k in range(spans) for place in scene.stations_m]
+    return replace(scene, faces=tuple(faces), stations_m=tuple(places[:stations]))
+
+
+def _moved(place_m: Vector3, by_m: Array) -> Vector3:
+    x, y, z = np.add(place_m, by_m).tolist()
+    return x, y, z
+
+
+def survey(scene: Scene, scanning: Scanning, folder: Path, prefix: str = "", *, looks: int = 1) -> Survey:
+    """The scene scanned from all its stations into PLY files of the folder. looks: how many times each
+    point is in its file, each a little elsewhere: scans of many points without as many rays."""
     folder.mkdir(parents=True, exist_ok=True)
     given, truth, checks = [], {}, {}
     firm = np.array([face.material not in LOOSE for face in scene.faces])
     for sweep in scan(scene, lambda _: None, scanning):
         name = prefix + sweep.name
         path = folder / f"{name}.ply"
-        write_ply(sweep.points, path)
+        write_ply(sweep.points if looks == 1 else _looked_at(sweep.points, looks), path)
         file = File(sha256=digest(path), size=path.stat().st_size, suffix=".ply")
         given.append((Scan(name=name, file=file, station_position_m=sweep.measured_m), path))
         truth[name] = sweep.T_world_scan
         on = np.flatnonzero((sweep.face >= 0) & firm[np.maximum(sweep.face, 0)])
         checks[name] = sweep.points[on[:: max(1, len(on) // CHECK_POINTS)]].astype(float)
     return Survey(tuple(given), truth, checks)
+
+
+def _looked_at(points: npt.NDArray[np.float32], looks: int) -> npt.NDArray[np.float32]:
+    rng = np.random.default_rng(len(points))
+    shifts = rng.normal(0.0, LOOK_SIGMA_M, (looks, 3)).astype(np.float32)
+    return (points[:, None] + shifts).reshape(-1, 3)
 
 
 def pose_errors(found: dict[str, npt.NDArray[np.float64]], survey: Survey) -> PoseErrors:
