@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import tifffile
+from scipy.spatial import cKDTree
 
 from artifacts import store
 from flows.console import out
@@ -53,6 +54,7 @@ class Run:
     refused: dict[str, str]  # before stitching, by name
     cpu_s: float
     steps_px: Array  # across seams
+    on_crack: npt.NDArray[np.bool_]  # which of these seam pixels lie on a crack
     heights: HeightMap | None  # that the mosaic lies on
 
 
@@ -90,7 +92,8 @@ def run(photos: WallPhotos) -> Run:
     mosaic = stitch.bare("wall", surface, tuple(taken), described, settings, None, relief)
     cpu_s = time.process_time() - began
     heights = _heights(mosaic)
-    return Run(photos, mosaic, refused, cpu_s, seam_steps_px(mosaic, photos, heights), heights)
+    steps_px, shown = seam_steps_px(mosaic, photos, heights)
+    return Run(photos, mosaic, refused, cpu_s, steps_px, _on_crack(shown, photos), heights)
 
 
 def _relief(photos: WallPhotos) -> Relief | None:
@@ -112,22 +115,34 @@ def _relief(photos: WallPhotos) -> Relief | None:
     return relief
 
 
-def seam_steps_px(mosaic: Mosaic, photos: WallPhotos, heights: HeightMap | None) -> Array:
-    """(N,) at pixels where two photos meet: how far apart on the wall lies what they show there."""
+def seam_steps_px(mosaic: Mosaic, photos: WallPhotos, heights: HeightMap | None) -> tuple[Array, Array]:
+    """At pixels where two photos meet: (N,) how far apart on the wall lies what they show there, and (N, 2)
+    what one of them shows, in metres of the wall."""
     source = tifffile.imread(store.current().path(mosaic.source), level=0).astype(np.int64)
     across = np.argwhere((source[:, 1:] != source[:, :-1]) & (source[:, 1:] > 0) & (source[:, :-1] > 0))
     down = np.argwhere((source[1:] != source[:-1]) & (source[1:] > 0) & (source[:-1] > 0))
     beside, below = np.tile(across, 2) + np.array([0, 0, 0, 1]), np.tile(down, 2) + np.array([0, 0, 1, 0])
     seams = np.concatenate([beside, below])
     pairs = np.column_stack([source[seams[:, 0], seams[:, 1]], source[seams[:, 2], seams[:, 3]]]) - 1
-    steps = [np.zeros(0)]
+    steps, places = [np.zeros(0)], [np.zeros((0, 2))]
     for i, j in np.unique(pairs, axis=0):
         if not {mosaic.photos[i].name, mosaic.photos[j].name} <= photos.truth.keys():
             continue
         at = seams[(pairs == [i, j]).all(axis=1)][:, [1, 0]].astype(float)
         shown = [photos.truth[mosaic.photos[k].name].see(_in_photo(mosaic, k, at, heights)) for k in (i, j)]
         steps.append(np.linalg.norm(shown[0] - shown[1], axis=1) / GSD_M)
-    return np.concatenate(steps)
+        places.append(shown[0])
+    return np.concatenate(steps), np.concatenate(places)
+
+
+def _on_crack(uv_m: Array, photos: WallPhotos) -> npt.NDArray[np.bool_]:
+    """(N,) whether places of the wall lie on a crack or within a pixel beside it."""
+    near = np.zeros(len(uv_m), np.bool_)
+    for one in photos.cracks:
+        away_m, at = cKDTree(one.uv_m).query(uv_m, distance_upper_bound=0.02)
+        half_m = np.append(np.maximum(one.left_m, one.right_m), -np.inf)[at]
+        near |= away_m < half_m + GSD_M
+    return near
 
 
 def errors(run: Run) -> Errors:
@@ -237,7 +252,30 @@ def rows_of(case: Case, runs: Sequence[Run], data: str) -> list[dict[str, Any]]:
         for run in runs
         for p in run.mosaic.placements
     )
+    on_cracks = []
+    if case.cracks_a_m2:
+        torn = np.concatenate([run.steps_px[run.on_crack] for run in runs])
+        length_m = sum(one.length_m for run in runs for one in run.photos.cracks)
+        met = f"{len(torn)} seam pixels on {length_m:.0f} m of cracks"
+        on_cracks = [
+            row(
+                f"{case.what}: step where a seam meets a crack, P95",
+                np.percentile(torn, 95),
+                "px",
+                most=STEP_P95,
+                **known | {"data": f"{data}, {met}"},
+            ),
+            row(
+                f"{case.what}: step where a seam meets a crack, worst",
+                torn.max(),
+                "px",
+                most=STEP_WORST,
+                **known | {"data": f"{data}, {met}"},
+            ),
+            row(f"{case.what}: seam pixels a metre of crack", len(torn) / length_m, "px", **known),
+        ]
     return [
+        *on_cracks,
         row(f"{case.what}: error", max(s.rms_px for s in scores), "px RMS", most=rms_bar, **known),
         row(f"{case.what}: worst error", max(s.worst_px for s in scores), "px", most=worst_bar, **known),
         row(f"{case.what}: mean d²/2", d2.mean() / 2, "1", least=0.8, most=1.2, **known),

@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from schemas.camera import Camera, CameraPose
 from schemas.geodesy import GeoOrigin
 from tasks.simulation.concrete import concrete
+from tasks.simulation.crack import CrackShape, crack
 from tasks.simulation.exposure import Motion, expose
 from tasks.simulation.face import Face
 from tasks.simulation.grain import power_law
@@ -52,6 +53,7 @@ class Case:
     gain: float = 0.15  # exposures differ by this, either way
     lost: int = 0
     intruders: bool = False  # photos of another wall, one mirrored, one cut short
+    cracks_a_m2: float = 0.0
 
 
 CASES = (
@@ -60,6 +62,7 @@ CASES = (
     Case("rolling", "rolling shutter 30 ms at 0.1 m/s", readout_s=0.03, speed_m_s=0.1),
     Case("relief", "3 cm of relief, no scan", relief_m=0.03),
     Case("relief-scan", "3 cm of relief, scanned", relief_m=0.03, scanned=True),
+    Case("cracks", "cracked wall", cracks_a_m2=0.6),
     Case("tiles", "repeated texture", surface="tiles"),
     Case("faint", "low contrast", surface="faint"),
     Case("lost", "shuffled names, photos lost, positions off by 1.5 m", position_sigma_m=1.5, lost=4),
@@ -86,6 +89,7 @@ class WallPhotos:
     position_sigma_m: float
     truth: dict[str, Shown]  # of the photos that belong to the wall
     scan_m: Array | None  # (N, 3) world points, as a registered model has them
+    cracks: tuple[CrackShape, ...]
     intruders: tuple[str, ...]
 
 
@@ -132,7 +136,9 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
     for name in intruders:
         poses[name] = poses[names[INTRUDED[name]]]
     scan = _scanned(relief, face, seed) if case.scanned else None
-    return WallPhotos(folder, nominal, face, poses, case.position_sigma_m, truth, scan, intruders)
+    return WallPhotos(
+        folder, nominal, face, poses, case.position_sigma_m, truth, scan, _cracks(case, face, seed), intruders
+    )
 
 
 INTRUDED = {"other-1.jpg": 1, "other-2.jpg": 2, "other-3.jpg": 3, "mirrored.jpg": 4, "cut.jpg": 5}
@@ -196,7 +202,7 @@ def _scene(case: Case, face: Face, camera: Camera, seed: int) -> Scene:
 
 def _baker(case: Case, seed: int) -> Callable[[Face], Skin]:
     def bake(face: Face) -> Skin:
-        skin, size = concrete(face, (), seed), (face.width_m, face.height_m)
+        skin, size = concrete(face, _cracks(case, face, seed), seed), (face.width_m, face.height_m)
         if case.surface == "faint":
             mean = skin.tone.mean(axis=(0, 1))
             tone = mean + np.float32(0.25) * (skin.tone - mean)
@@ -219,6 +225,22 @@ def _baker(case: Case, seed: int) -> Callable[[Face], Skin]:
 
 
 RELIEF_TEXEL_M = 0.02
+
+
+def _cracks(case: Case, face: Face, seed: int) -> tuple[CrackShape, ...]:
+    """Here and there, any way, 1 to 5 mm wide and half a metre to two long."""
+    rng = np.random.default_rng([seed, 13])
+    cracks = []
+    for k in range(round(case.cracks_a_m2 * face.width_m * face.height_m)):
+        start = (float(rng.uniform(0.1, 0.9) * face.width_m), float(rng.uniform(0.1, 0.9) * face.height_m))
+        heading, length, width = rng.uniform(0, 360), rng.uniform(0.5, 2.0), rng.uniform(0.001, 0.005)
+        one = crack(rng, f"C{k}", start, heading, length, width)
+        inside = ((one.uv_m > 0) & (one.uv_m < [face.width_m, face.height_m])).all(axis=1)
+        end = len(inside) if inside.all() else int(np.argmin(inside))
+        if end > 20:
+            parts = (one.uv_m[:end], one.left_m[:end], one.right_m[:end], one.kept_light[:end])
+            cracks.append(CrackShape(one.id, None, *parts))
+    return tuple(cracks)
 
 
 def _relief(case: Case, face: Face, seed: int) -> npt.NDArray[np.float32]:
