@@ -4,7 +4,6 @@ Each seed is a bridge of its own noise, trees and positions, scanned from nine s
 each). Peers and settings are in registration_peers.py. A time is CPU seconds on one core.
 """
 
-import resource
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -38,18 +37,15 @@ from tests.benchmarks.surveys import (
     pose_errors,
     registered,
     survey,
-    viaduct,
 )
 from tests.benchmarks.table import Row, row
 
 SEEDS = range(1, 6)
 REFUSAL_SEEDS = range(1, 11)
 STEP_DEG = 0.25  # about 400,000 points a scan
-GROWTH_STEPS_DEG = (0.6, 0.42, 0.3, 0.21)
 COARSE_STEP_DEG = 0.6  # where only yes or no is asked
 RIGHT_DEG, RIGHT_M = 1.0, 0.3
 EVERY = 4  # one pair of so many is placed blindly by peers too
-LOOKS = 50  # so that a scan has some 20 million points
 TARGETS = 8
 TARGET_SIGMA_M = 0.001  # of a target's centre in a scan
 IN_99 = 16.81  # of χ² with six degrees of freedom
@@ -59,7 +55,7 @@ def known_positions() -> Iterator[Row]:
     """Positions known to 5 cm, beside the same edges by others."""
     checks, worst, cpu, unity, inside = ([] for _ in range(5))
     peers: dict[Gicp, list[tuple[float, float, float]]] = {PLAIN: [], FINE: []}
-    for seed, case in _surveys("known"):
+    for seed, case in surveys("known"):
         found, T, cpu_s = registered(case)
         errors = pose_errors(T, case)
         checks.append(errors.check_mm)
@@ -94,7 +90,7 @@ def known_positions() -> Iterator[Row]:
 def targets() -> Iterator[Row]:
     """The datum by surveyed targets."""
     control, judged = [], []
-    for seed, case in _surveys("targets", COARSE_STEP_DEG):
+    for seed, case in surveys("targets", COARSE_STEP_DEG):
         with_targets, surveyed = _with_targets(case, seed)
         tied, _, _ = registered(with_targets, surveyed)
         missed = [r for r in tied.targets if not r.check and not r.used]
@@ -111,7 +107,7 @@ def targets() -> Iterator[Row]:
 def no_poses() -> Iterator[Row]:
     """Nothing known: the whole set."""
     checks, worst, cpu, missing = [], [], [], 0
-    for _, case in _surveys("blind"):
+    for _, case in surveys("blind"):
         found, T, cpu_s = registered(case.without_positions())
         errors = pose_errors(T, case)
         checks.append(errors.check_mm)
@@ -129,7 +125,7 @@ def blind_pairs() -> Iterator[Row]:
     """Nothing known: each overlapping pair for itself, before the fine step."""
     right: dict[str, list[bool]] = {"ours": [], **{name: [] for name in BLIND}}
     ours_on_some: list[bool] = []
-    for _, case in _surveys("pairs", COARSE_STEP_DEG):
+    for _, case in surveys("pairs", COARSE_STEP_DEG):
         found, _, _ = registered(case)
         pairs = [(p.source, p.target) for p in found.pairs]
         placed = _placed_blindly(case.without_positions(), pairs)
@@ -180,7 +176,7 @@ def every_fault() -> Iterator[Row]:
 def wrong_pose() -> Iterator[Row]:
     """All poses stated, one wrong by 10 m and 180°."""
     worst, lost = [], 0
-    for seed, case in _surveys("wrong", COARSE_STEP_DEG):
+    for seed, case in surveys("wrong", COARSE_STEP_DEG):
         given = []
         for k, (one, path) in enumerate(case.given):
             T = case.T_world_scan[one.name]
@@ -222,46 +218,6 @@ def _refused(ours: Survey, others: Survey, seed: int) -> list[bool]:
     return right
 
 
-def growth() -> Iterator[Row]:
-    """Exponents of CPU time, by the slope of a line through logarithms."""
-    points, seconds = [], []
-    for step_deg in GROWTH_STEPS_DEG:
-        for _, case in _surveys("points", step_deg, SEEDS[:1]):
-            found, _, cpu_s = registered(case)
-        points.append(sum(s.points for s in found.stations))
-        seconds.append(cpu_s)
-    data = f"simulated bridge, 9 stations, {points[0]:,} to {points[-1]:,} points"
-    yield row("growth of CPU time with points", _slope(points, seconds), "exponent", "≤ 1.15", data, "1")
-    pairs, seconds = [], []
-    for _, case in _surveys("stations", COARSE_STEP_DEG, SEEDS[:1]):
-        for stations in (4, 6, 7, 9):
-            found, _, cpu_s = registered(Survey(case.given[:stations], case.T_world_scan, case.checks_m))
-            pairs.append(len(found.pairs))
-            seconds.append(cpu_s)
-    data = f"simulated bridge, {pairs[0]} to {pairs[-1]} overlapping pairs"
-    yield row("growth of CPU time with pairs", _slope(pairs, seconds), "exponent", "≤ 1.15", data, "1")
-
-
-def fifty_stations() -> Iterator[Row]:
-    """As many points as a crew brings at most: run alone, since the memory is the process's."""
-    with TemporaryDirectory() as name:
-        scanning = Scanning(step_deg=STEP_DEG)
-        case = survey(viaduct(1, 50), scanning, Path(name), looks=LOOKS)
-        found, T, cpu_s = registered(case)
-        errors = pose_errors(T, case)
-    points = sum(s.points for s in found.stations)
-    known: dict[str, Any] = {
-        "data": f"simulated viaduct, {len(case.given)} stations, {points / 1e6:.0f} million points",
-        "seed": "1",
-    }
-    gib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    yield row("fifty stations: peak memory", gib, "GiB", "≤ 8", **known)
-    yield row("fifty stations: stations lost", len(found.left_out), "stations", "≤ 0", **known)
-    yield row("fifty stations: check points", errors.check_mm, "mm RMSE", "≤ 2", **known)
-    yield row("fifty stations: worst station", max(errors.station_mm.values()), "mm", "≤ 2", **known)
-    yield row("fifty stations: CPU time", cpu_s, "s", None, **known)
-
-
 PARTS = {
     "known-positions": known_positions,
     "targets": targets,
@@ -270,12 +226,10 @@ PARTS = {
     "every-fault": every_fault,
     "wrong-pose": wrong_pose,
     "refusals": refusals,
-    "growth": growth,
-    "fifty-stations": fifty_stations,
 }
 
 
-def _surveys(
+def surveys(
     name: str, step_deg: float = STEP_DEG, seeds: Sequence[int] = SEEDS
 ) -> Iterator[tuple[int, Survey]]:
     """The nine-station bridge of each seed, its files gone when the next one comes."""
@@ -374,10 +328,6 @@ def _with_targets(case: Survey, seed: int) -> tuple[Survey, tuple[SiteTarget, ..
         )
         given.append((one.model_copy(update={"targets": seen}), path))
     return Survey(tuple(given), case.T_world_scan, case.checks_m), surveyed
-
-
-def _slope(sizes: Sequence[float], seconds: Sequence[float]) -> float:
-    return float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])
 
 
 def _share(right: Sequence[bool]) -> float:
