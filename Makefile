@@ -26,7 +26,7 @@ $(addprefix bench-,$(BENCHES)): bench-%: .venv/.ready
 train-detector: .venv/.ready  # two hours on two cores; PHOTOS=FOLDER holds images/, masks/ and groups.txt
 	@[ -n "$(PHOTOS)" ] || { echo "Name the photos: make train-detector PHOTOS=FOLDER"; exit 1; }
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[train]'
-	$(BIN)/python -m training.surfaces build/training/surfaces 330
+	$(BIN)/python -m training.surfaces build/training/surfaces 900
 	$(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/run --fold 0
 	$(BIN)/python -m training.export build/training/run/weights.pt build/training/hairline.onnx
 

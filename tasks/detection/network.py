@@ -20,7 +20,7 @@ from tasks.detection.sauvola import Mask
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
 SHA256 = "030662d23614c4284c81831a6cde29fa5bf7563f26b42823b31303741192718f"
-STRIDE = 16
+STRIDE = 32
 TILE_PX = 2048
 HALO_PX = 96  # of an octave: what lies further away changes a probability by 3/255 at most (measured)
 OCTAVES = (0.7, 0.3)  # at half size our network sees twice as far, and wide cracks whole
