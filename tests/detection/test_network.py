@@ -79,7 +79,7 @@ def test_tiles_give_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> Non
     rgb = rough(500, 620, contrast=0.05)
     with_crack(rgb, 250, 3, 0.6, 10, 600)
     whole = probability(ArrayRaster(rgb), our_model()).astype(int)
-    monkeypatch.setattr(network, "TILE_PX", 160)
+    monkeypatch.setattr(network, "TILE_PX", 192)
     tiled = probability(ArrayRaster(rgb), our_model()).astype(int)
     assert (whole > 200).any()
     assert np.abs(tiled - whole).max() <= 4 and (np.abs(tiled - whole) > 1).mean() < 1e-3
