@@ -26,6 +26,7 @@ from training.cracks import DOUBTFUL, VISIBLE, Cracks, cracks_on, one_crack, see
 
 SIDE_PX = 640
 FOCAL_PX = 4000.0
+RAGGED = 0.4  # share of joints that are no clean lines
 CRACK_FREE = 0.35  # share of surfaces without any crack
 TEXEL_PX = 2.0
 
@@ -117,7 +118,8 @@ def _bowed(start: Array, end: Array, width_m: float, kept: float, bow_m: float) 
 
 
 def _joints(rng: Rng, tone: Floats, side_m: float, px_m: float, texel_m: float) -> list[Shapes]:
-    """Formwork joints: straight, upright or level or turned, dark or bright, each board its own tone."""
+    """Joints: straight, upright or level or turned. Between boards dark or bright, each board its own tone;
+    between two days' pours dark, ragged along both edges, and wet below."""
     shapes = []
     turned = rng.choice([0.0, np.pi / 2, rng.uniform(0, np.pi)], p=[0.4, 0.4, 0.2]) + rng.normal(0, 0.02)
     rows, columns = np.mgrid[: tone.shape[0], : tone.shape[1]] * texel_m
@@ -126,6 +128,11 @@ def _joints(rng: Rng, tone: Floats, side_m: float, px_m: float, texel_m: float) 
         start, end = _through(rng, side_m, angle)
         width_m = rng.uniform(0.8, 6.0) * px_m
         kept = rng.uniform(0.15, 0.85) if rng.random() < 0.8 else rng.uniform(1.1, 1.4)
+        if rng.random() < RAGGED:
+            shapes.append(_ragged(rng, start, end, width_m, min(kept, 0.8), px_m).shapes)
+            if rng.random() < 0.5:
+                _drips(rng, tone, start, end, px_m, texel_m)
+            continue
         shapes.append(_straight(start, end, width_m, kept))
         if rng.random() < 0.4:  # a lip beside it that catches the light
             off = np.array([-np.sin(angle), np.cos(angle)]) * width_m
@@ -133,6 +140,30 @@ def _joints(rng: Rng, tone: Floats, side_m: float, px_m: float, texel_m: float) 
         side = (columns - start[0]) * -np.sin(angle) + (rows - start[1]) * np.cos(angle) > 0
         tone[side] *= np.float32(np.exp(rng.normal(0.0, 0.06)))
     return shapes
+
+
+def _ragged(rng: Rng, start: Array, end: Array, width_m: float, kept: float, px_m: float) -> CrackShape:
+    n = int(np.linalg.norm(end - start) / (2.0 * px_m))
+    along = (end - start) / np.linalg.norm(end - start)
+    off_m = px_m * (rng.uniform(0.2, 1.2) * walk(rng, n, 4.0) + rng.uniform(0.3, 2.0) * walk(rng, n, 25.0))
+    uv = start + np.linspace(0.0, 1.0, n)[:, None] * (end - start)
+    uv += off_m[:, None] * np.array([-along[1], along[0]])
+    left, right = (
+        0.5 * width_m * np.exp(0.6 * walk(rng, n, rng.uniform(2.0, 12.0)) + 0.3 * walk(rng, n, 60.0))
+        for _ in range(2)
+    )
+    return CrackShape("joint", None, uv, left, right, np.clip(kept + 0.15 * walk(rng, n, 8.0), 0.05, 0.95))
+
+
+def _drips(rng: Rng, tone: Floats, start: Array, end: Array, px_m: float, texel_m: float) -> None:
+    """Dark runs of water, side by side below a joint."""
+    reach_m = float(np.exp(rng.uniform(np.log(30), np.log(250)))) * px_m
+    dark = rng.uniform(0.1, 0.5)
+    for _ in range(int(rng.integers(3, 25))):
+        u, v = start + rng.uniform(0.0, 1.0) * (end - start)
+        size = (float(rng.uniform(1.0, 5.0)) * px_m, reach_m * float(rng.uniform(0.3, 1.5)))
+        factor = float(np.exp(-dark * rng.uniform(0.3, 1.5)))
+        streak(tone, texel_m, (float(u), float(v)), size, (factor, factor, factor))
 
 
 def _bricks(rng: Rng, tone: Floats, side_m: float, px_m: float, texel_m: float) -> list[Shapes]:
