@@ -1,10 +1,10 @@
 """Bundle adjustment of plane-induced cameras: what makes a mosaic metric.
 
-Unknown: eight numbers a photo (rotation, position, rolling shutter), a focal length and k1 per camera, the
-positions' common error, two coordinates per track on the plane. Residuals are pixels of the photos as taken,
-through the full Brown model, so nothing is gained by shrinking the mosaic: what is left free is a similarity,
-which the priors hold. How much a rolling shutter may do is learnt from all photos together, where they tell
-of one at all: free to do anything in each, it would make them free homographies, which are not metric.
+Unknown: eight numbers a photo (rotation, position, rolling shutter), focal length, k1 and principal point per
+camera, the positions' common error, two coordinates per track on the plane. Residuals are pixels of the
+photos as taken, so nothing is gained by shrinking the mosaic: what is left free is a similarity, which the
+priors hold. How much a rolling shutter may do is learnt from all photos together, where they tell of one at
+all: free to do anything in each, it would make them free homographies, which are not metric.
 Levenberg-Marquardt with Cauchy weights; tracks are eliminated (Schur complement, Triggs et al. 2000, section
 6), photos remain as a banded system."""
 
@@ -19,11 +19,11 @@ from tasks.stitching.bundle import (
     build_bundle,
     camera_key,
     linearise,
-    nominal_k1,
+    nominal_lens,
     points,
     prior_errors,
     residuals,
-    sigma_k1,
+    sigma_lens,
 )
 from tasks.stitching.normal_equations import damped_step
 from tasks.stitching.prior import Prior
@@ -74,8 +74,7 @@ def adjust(
         R=np.stack([v.R for v in own]),
         C=np.stack([v.C for v in own]),
         roll=np.zeros((len(own), 2)),
-        log_focal=np.zeros(len(cameras)),
-        k1=np.array([c.k1 for c in cameras]),
+        lens=nominal_lens(cameras),
         bias=np.zeros(3),
         X=np.zeros((0, 2)),
     )
@@ -182,7 +181,6 @@ def _cost(state: State, bundle: Bundle, residual: Array, sigma: float, variance:
         (bundle.weight_rotation * turned**2).sum(),
         (bundle.weight_bias * state.bias**2).sum(),
         ((state.roll / bundle.sigma_roll) ** 2).sum(),
-        ((state.log_focal / bundle.sigma_log_focal) ** 2).sum(),
-        (((state.k1 - nominal_k1(bundle)) / sigma_k1(bundle)) ** 2).sum(),
+        (((state.lens - nominal_lens(bundle.cameras)) / sigma_lens(bundle)) ** 2).sum(),
     )
     return float(sum(terms))

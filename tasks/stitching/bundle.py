@@ -14,7 +14,10 @@ from tasks.stitching.tracks import Index, Observations
 from tasks.stitching.view import FACING, Array, View, rolled, rotation, rotation_vector, with_lens
 
 PER_PHOTO = 8  # unknowns: rotation, position, rolling shutter
-K1_AT_EDGE = 0.03  # 1σ of what k1 may move the photo's edge by, as a share of its radius
+PER_CAMERA = 4  # ln focal length, k1, principal point
+# 1σ of a lens, where its principal point is stated (a calibration) and where not: what k1 may move the
+# photo's edge by, as a share of its radius; and where the axis meets the sensor, in focal lengths.
+K1_AT_EDGE, CENTRE = {True: 0.002, False: 0.03}, {True: 0.0005, False: 0.005}
 HELD = 0.01  # 1σ, of its distance and in radians, of the photo that holds a bundle without positions
 
 
@@ -23,8 +26,7 @@ class State:
     R: Array  # (n, 3, 3)
     C: Array  # (n, 3)
     roll: Array  # (n, 2) pixels that the rolling shutter moves the last row by against the first
-    log_focal: Array  # (cameras,) relative to the nominal
-    k1: Array  # (cameras,)
+    lens: Array  # (cameras, 4) ln of the focal length over the nominal one, k1, principal point
     bias: Array  # (3,)
     X: Array  # (tracks, 2)
 
@@ -50,13 +52,11 @@ class Bundle:
 
     @property
     def shared(self) -> int:
-        return 2 * len(self.cameras) + 3
+        return PER_CAMERA * len(self.cameras) + 3
 
     def view(self, state: State, k: int) -> View:
         c = int(self.camera_of[k])
-        nominal = self.cameras[c]
-        focal = float(nominal.focal_px * np.exp(state.log_focal[c]))
-        camera = with_lens(nominal, focal, float(state.k1[c]))
+        camera = with_lens(self.cameras[c], state.lens[c])
         return View(camera, state.R[k], state.C[k], state.roll[k], self.relief)
 
 
@@ -137,13 +137,19 @@ def prior_errors(state: State, bundle: Bundle) -> tuple[Array, Array]:
     return turned, state.C - bundle.prior_C - state.bias
 
 
-def nominal_k1(bundle: Bundle) -> Array:
-    return np.array([c.k1 for c in bundle.cameras])
+def nominal_lens(cameras: Sequence[Camera]) -> Array:
+    return np.array([(0.0, c.k1, *c.principal_px) for c in cameras])
 
 
-def sigma_k1(bundle: Bundle) -> Array:
-    radius = np.array([np.hypot(c.width_px, c.height_px) / 2 / c.focal_px for c in bundle.cameras])
-    return np.asarray(K1_AT_EDGE / radius**2)
+def sigma_lens(bundle: Bundle) -> Array:
+    """(cameras, 4) 1σ before any photo was seen."""
+    sigmas = []
+    for camera, sigma_log_focal in zip(bundle.cameras, bundle.sigma_log_focal, strict=True):
+        radius = np.hypot(camera.width_px, camera.height_px) / 2 / camera.focal_px
+        calibrated = camera.cx_px is not None
+        centre_px = CENTRE[calibrated] * camera.focal_px
+        sigmas.append((sigma_log_focal, K1_AT_EDGE[calibrated] / radius**2, centre_px, centre_px))
+    return np.array(sigmas)
 
 
 def _ideal(state: State, bundle: Bundle) -> tuple[Array, Array]:
@@ -162,7 +168,7 @@ def residuals(state: State, bundle: Bundle) -> Array:
     of = bundle.camera_of[bundle.photo]
     for c, nominal in enumerate(bundle.cameras):
         mine = of == c
-        camera = with_lens(nominal, float(nominal.focal_px * np.exp(state.log_focal[c])), float(state.k1[c]))
+        camera = with_lens(nominal, state.lens[c])
         residual[mine] += camera.distort(xy[mine]) * camera.focal_px + camera.principal_px
     return residual
 
@@ -170,7 +176,7 @@ def residuals(state: State, bundle: Bundle) -> Array:
 @dataclass(frozen=True)
 class Jacobians:
     pose: Array  # (M, 2, 8) by rotation (in the camera's frame, radians), position and rolling shutter
-    lens: Array  # (M, 2, 2) by log focal and k1
+    lens: Array  # (M, 2, 4) by the numbers of State.lens
     point: Array  # (M, 2, 2)
 
 
@@ -178,11 +184,11 @@ def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
     xy, p = _ideal(state, bundle)
     x, y = xy.T
     of = bundle.camera_of[bundle.photo]
-    focal = (np.array([c.focal_px for c in bundle.cameras]) * np.exp(state.log_focal))[of]
+    focal = (np.array([c.focal_px for c in bundle.cameras]) * np.exp(state.lens[:, 0]))[of]
     distorted, by_k1, by_ideal = np.empty_like(xy), np.empty_like(xy), np.empty((len(x), 2, 2))
     for c, nominal in enumerate(bundle.cameras):
         mine = of == c
-        lens = with_lens(nominal, nominal.focal_px, float(state.k1[c])).distortion
+        lens = with_lens(nominal, state.lens[c]).distortion
         distorted[mine], by_k1[mine], by_ideal[mine] = (
             lens.distort(xy[mine]),
             lens.by_k1(xy[mine]),
@@ -200,11 +206,13 @@ def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
     along = moving[:, :, :2]
     if bundle.relief is not None:  # a point that moves on the surface rises and falls with it
         along = along + moving[:, :, 2:] * bundle.relief.slope(state.X)[bundle.track][:, None, :]
-    principal = np.array([cam.principal_px for cam in bundle.cameras])[of]
+    shifts = np.broadcast_to(np.eye(2), (len(x), 2, 2))
     rolling = bundle.rolled[:, None, None] * np.eye(2)
-    residual = focal[:, None] * distorted + principal + state.roll[bundle.photo] * bundle.rolled[:, None]
+    residual = (
+        focal[:, None] * distorted + state.lens[of, 2:] + state.roll[bundle.photo] * bundle.rolled[:, None]
+    )
     return residual - bundle.xy, Jacobians(
         pose=np.concatenate([by_camera @ turning, -moving, rolling], axis=2),
-        lens=focal[:, None, None] * np.stack([distorted, by_k1], axis=2),
+        lens=np.concatenate([focal[:, None, None] * np.stack([distorted, by_k1], axis=2), shifts], axis=2),
         point=np.ascontiguousarray(along),
     )

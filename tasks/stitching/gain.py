@@ -67,9 +67,9 @@ def unvignetted(layer: Floats, at: Floats, view: View, falloff: Array) -> Floats
 
 
 def _rho2(at: npt.NDArray[np.floating], view: View) -> npt.NDArray[np.floating]:
-    """Squared distance of photo pixels (…, 2) from the middle, 1 in the corners."""
+    """Squared distance of photo pixels (…, 2) from the lens's axis, about 1 in the corners."""
     w, h = view.camera.width_px, view.camera.height_px
-    off = at - np.array([(w - 1) / 2, (h - 1) / 2], at.dtype)
+    off = at - np.array(view.camera.principal_px, at.dtype)
     return np.asarray(np.minimum((off**2).sum(axis=-1) * at.dtype.type(4.0 / (w * w + h * h)), RIM))
 
 

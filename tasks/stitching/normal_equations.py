@@ -6,7 +6,16 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from tasks.stitching.bundle import PER_PHOTO, Bundle, Jacobians, State, nominal_k1, prior_errors, sigma_k1
+from tasks.stitching.bundle import (
+    PER_CAMERA,
+    PER_PHOTO,
+    Bundle,
+    Jacobians,
+    State,
+    nominal_lens,
+    prior_errors,
+    sigma_lens,
+)
 from tasks.stitching.skyline import solve_positive
 from tasks.stitching.tracks import Index
 from tasks.stitching.view import Array, rotation
@@ -18,8 +27,8 @@ class Reduced:
 
     S: Array  # (size, size)
     g: Array  # (size,)
-    columns: Index  # (M, 10) unknowns that each observation touches
-    mixed: Array  # (M, 2, 10) and how its track hangs together with them
+    columns: Index  # (M, 12) unknowns that each observation touches
+    mixed: Array  # (M, 2, 12) and how its track hangs together with them
     H_inverse: Array  # (tracks, 2, 2)
     h: Array  # (tracks, 2)
 
@@ -35,11 +44,11 @@ def reduced(
 ) -> Reduced:
     """weight: (M,) of the observations, 1/px²; trust: (n,) factors on the weights of the prior positions."""
     n, size = len(state.C), PER_PHOTO * len(state.C) + bundle.shared
-    camera = np.concatenate([jacobians.pose, jacobians.lens], axis=2)  # (M, 2, 10)
+    camera = np.concatenate([jacobians.pose, jacobians.lens], axis=2)  # (M, 2, 12)
     columns = np.concatenate(
         [
             PER_PHOTO * bundle.photo[:, None] + np.arange(PER_PHOTO),
-            PER_PHOTO * n + 2 * bundle.camera_of[bundle.photo][:, None] + np.arange(2),
+            PER_PHOTO * n + PER_CAMERA * bundle.camera_of[bundle.photo][:, None] + np.arange(PER_CAMERA),
         ],
         axis=1,
     )
@@ -70,15 +79,14 @@ def damped_step(
     n, size = len(state.C), PER_PHOTO * len(state.C) + bundle.shared
     system = reduced(state, bundle, residual, jacobians, weight, trust, damping)
     d = solve_positive(system.S, -system.g, bundle.shared)
-    pose, lens = d[: PER_PHOTO * n].reshape(n, PER_PHOTO), d[PER_PHOTO * n : size - 3].reshape(-1, 2)
+    pose, lens = d[: PER_PHOTO * n].reshape(n, PER_PHOTO), d[PER_PHOTO * n : size - 3].reshape(-1, PER_CAMERA)
     pulled = np.einsum("mki,mi->mk", system.mixed, d[system.columns])
     back = -system.h - _by_track(pulled, bundle.track, len(state.X))
     return State(
         R=state.R @ rotation(pose[:, :3]),
         C=state.C + pose[:, 3:6],
         roll=state.roll + pose[:, 6:],
-        log_focal=state.log_focal + lens[:, 0],
-        k1=state.k1 + lens[:, 1],
+        lens=state.lens + lens,
         bias=state.bias + d[size - 3 :],
         X=state.X + np.einsum("tij,tj->ti", system.H_inverse, back),
     )
@@ -131,7 +139,7 @@ def _eliminate(
                 row, y0, y1 = half[columns[m, i]], share * Y[0, i], share * Y[1, i]
                 for j in range(PER_PHOTO):
                     row[own + j] += y0 * mixed[other, 0, j] + y1 * mixed[other, 1, j]
-                for j in range(2):
+                for j in range(PER_CAMERA):
                     row[lens + j] += y0 * mixed[other, 0, PER_PHOTO + j] + y1 * mixed[other, 1, PER_PHOTO + j]
 
 
@@ -167,9 +175,6 @@ def _add_priors(A: Array, g: Array, state: State, bundle: Bundle, trust: Array) 
     A[bias, own[:, 3:6]] -= position
     A[bias, bias] += bundle.weight_bias + position.sum(axis=0)
     g[bias] += bundle.weight_bias * state.bias - (position * moved).sum(axis=0)
-    focal = PER_PHOTO * n + 2 * np.arange(len(bundle.cameras))
-    A[focal, focal] += bundle.sigma_log_focal**-2.0
-    g[focal] += state.log_focal * bundle.sigma_log_focal**-2.0
-    k1_weight = sigma_k1(bundle) ** -2.0
-    A[focal + 1, focal + 1] += k1_weight
-    g[focal + 1] += k1_weight * (state.k1 - nominal_k1(bundle))
+    lens, lens_weight = np.arange(PER_PHOTO * n, size - 3), sigma_lens(bundle) ** -2.0
+    A[lens, lens] += lens_weight.ravel()
+    g[lens] += (lens_weight * (state.lens - nominal_lens(bundle.cameras))).ravel()

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.stitching.bundle import PER_PHOTO, Bundle, State, linearise
+from tasks.stitching.bundle import PER_CAMERA, PER_PHOTO, Bundle, State, linearise
 from tasks.stitching.normal_equations import reduced
 from tasks.stitching.skyline import solve_positive
 from tasks.stitching.tracks import Index
@@ -107,6 +107,6 @@ def _middles(state: State, bundle: Bundle, size: int) -> tuple[Array, Array]:
     J[photo[:, None], :, PER_PHOTO * photo[:, None] + np.arange(PER_PHOTO)] = np.swapaxes(
         moves[:, :, :PER_PHOTO], 1, 2
     )
-    lens = PER_PHOTO * n + 2 * bundle.camera_of[:, None] + np.arange(2)
+    lens = PER_PHOTO * n + PER_CAMERA * bundle.camera_of[:, None] + np.arange(PER_CAMERA)
     J[photo[:, None], :, lens] = np.swapaxes(moves[:, :, PER_PHOTO:], 1, 2)
     return X, J.reshape(2 * n, size)

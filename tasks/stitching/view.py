@@ -114,9 +114,12 @@ def rolled(row_px: npt.ArrayLike, camera: Camera) -> Array:
     return np.asarray((np.asarray(row_px, dtype=float) + 0.5) / camera.height_px - 0.5)
 
 
-def with_lens(camera: Camera, focal_px: float, k1: float) -> Camera:
-    """Not model_copy: it would carry over the cached matrix."""
-    return Camera.model_validate(camera.model_dump() | {"focal_px": focal_px, "k1": k1})
+def with_lens(camera: Camera, lens: Array) -> Camera:
+    """The camera with another lens: ln of its focal length over the camera's, k1, principal point in pixels.
+    Not model_copy: it would carry over the cached matrix."""
+    log_focal, k1, cx, cy = lens.tolist()
+    values = {"focal_px": camera.focal_px * float(np.exp(log_focal)), "k1": k1, "cx_px": cx, "cy_px": cy}
+    return Camera.model_validate(camera.model_dump() | values)
 
 
 def shrunk(view: View, factor: int) -> View:

@@ -44,6 +44,7 @@ class Case:
     name: str
     what: str
     k1: float = 0.0  # that nobody knows of
+    centre: float = 0.0  # of the focal length: how far the lens lies off the sensor's middle, either way
     readout_s: float = 0.0
     speed_m_s: float = 0.0
     relief_m: float = 0.0  # from the lowest to the highest point
@@ -59,6 +60,7 @@ class Case:
 CASES = (
     Case("plane", "plane, global shutter"),
     Case("k1", "k1 = −0.05 unknown", k1=-0.05),
+    Case("centre", "k1 = −0.05 and a lens off its middle, unknown", k1=-0.05, centre=0.004),
     Case("rolling", "rolling shutter 30 ms at 0.1 m/s", readout_s=0.03, speed_m_s=0.1),
     Case("relief", "3 cm of relief, no scan", relief_m=0.03),
     Case("relief-scan", "3 cm of relief, scanned", relief_m=0.03, scanned=True),
@@ -102,8 +104,7 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
     face = _face(nominal, columns, rows)
     rng = np.random.default_rng([seed, *case.name.encode()])
     scene = _scene(case, face, nominal, seed)
-    true_camera = scene.true_camera.model_copy(update={"k1": scene.true_camera.k1 + case.k1})
-    true_camera = Camera.model_validate(true_camera.model_dump())
+    true_camera = _true_camera(case, scene.true_camera)
     shots = _shots(case, true_camera, face, columns, rows, rng)
     lost = set(rng.choice(len(shots), case.lost, replace=False).tolist())
     shots = [shot for k, shot in enumerate(shots) if k not in lost]
@@ -142,6 +143,14 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
 
 
 INTRUDED = {"other-1.jpg": 1, "other-2.jpg": 2, "other-3.jpg": 3, "mirrored.jpg": 4, "cut.jpg": 5}
+
+
+def _true_camera(case: Case, camera: Camera) -> Camera:
+    """With what nobody knows of it."""
+    x, y = camera.principal_px
+    off = case.centre * camera.focal_px
+    values = {"k1": camera.k1 + case.k1, "cx_px": x + off, "cy_px": y - 0.6 * off}
+    return Camera.model_validate(camera.model_dump() | values)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from schemas.camera import Camera
 from tests.stitching.photo_sets import errors_px, photo_set
 from tests.stitching.scenes import WALL, Texture, grid_poses, render, reported
 
-FISHEYE = Camera(width_px=816, height_px=612, focal_px=600.0, lens="fisheye", k1=-0.02, k2=0.004)
+CALIBRATED = {"focal_px": 600.0, "cx_px": 407.5, "cy_px": 305.5, "k1": -0.02, "k2": 0.004}
+FISHEYE = Camera(width_px=816, height_px=612, lens="fisheye", **CALIBRATED)
 
 
 def test_a_wall_through_a_fisheye(texture: Texture, tmp_path: Path) -> None:
