@@ -11,8 +11,8 @@ from skimage.morphology import skeletonize
 from training.cracks import DOUBTFUL, VISIBLE, cracks_on, seen
 
 SIDE_PX = 224
-ON_CRACK = 0.5  # share of the crops of a photo with a crack that are centred on it
-DRAWN = 0.25  # share of the crops of photos on which further cracks are drawn: real surfaces, known cracks
+ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
+DRAWN = 0.1  # share of the crops of photos on which further cracks are drawn: real surfaces, known cracks
 FOLDS = 5
 
 Pixels = npt.NDArray[np.uint8]

@@ -1,9 +1,9 @@
 """Train the network: `python -m training.train PHOTOS SURFACES OUT [--fold N] [--steps N] [--start PT]`.
 
 PHOTOS holds images/, masks/ and groups.txt, SURFACES what training.surfaces wrote. With --fold the photos of
-that fold (by group) are left out and judged along the way; without, all take part. Half of each batch is
-photos, half surfaces. One thread and a seed: the same result on the same machine. --start goes on from
-weights that an earlier call wrote, with a rate (--rate) that starts anew (Loshchilov & Hutter 2017).
+that fold (by group) are left out and judged along the way; without, all take part. Of each batch two thirds
+are photos, the rest surfaces. One thread and a seed: the same result on the same machine. --start goes on
+from weights that an earlier call wrote, with a rate (--rate) that starts anew (Loshchilov & Hutter 2017).
 """
 
 import argparse
@@ -22,7 +22,7 @@ from torch.nn import functional
 from training.network import Network
 from training.photos import DRAWN, Photo, by_fold, crop, read
 
-BATCH = 6  # half of it photos, half surfaces
+BATCH = 6  # two of three are photos, the others surfaces
 RATE, WARM_UP, DECAY = 3e-3, 300, 1e-3
 AVERAGED = 0.999  # weights are averaged over about 1 / (1 − AVERAGED) steps: these are judged and kept
 EVERY = 1000  # steps between checkpoints
@@ -42,10 +42,8 @@ def loss_of(logit: Tensor, truth: Tensor) -> Tensor:
 
 def batch(photos: list[Photo], surfaces: list[Photo], seed: int) -> tuple[Tensor, Tensor]:
     rng = np.random.default_rng(seed)
-    pairs = [
-        crop((photos if k % 2 == 0 else surfaces)[rng.integers(len(photos if k % 2 == 0 else surfaces))], rng)
-        for k in range(BATCH)
-    ]
+    sources = [surfaces if k % 3 == 2 else photos for k in range(BATCH)]
+    pairs = [crop(source[rng.integers(len(source))], rng) for source in sources]
     return torch.from_numpy(np.stack([p[0] for p in pairs])), torch.from_numpy(
         np.stack([p[1] for p in pairs])
     )

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tasks.detection.bridges import bridged
 from tasks.detection.components import Components, components
 from tasks.detection.network import Probability
 
@@ -41,9 +40,9 @@ class Candidates(NamedTuple):
         return tuple(scored)
 
 
-def candidates(probability: Probability, gap_px: float = 0.0) -> Candidates:
-    """Connected pixels of at least EDGE that hold one of at least SURE, gaps bridged, each with its score."""
-    found = components(bridged(probability, EDGE, gap_px))
+def candidates(probability: Probability) -> Candidates:
+    """Connected pixels of at least EDGE that hold one of at least SURE, each with its score."""
+    found = components(probability >= EDGE)
     sure = found.holding(probability >= SURE)
     score = np.where(sure, score_of(features(found, probability)), 0.0)
     score[0] = 0.0

@@ -21,7 +21,6 @@ from tasks.detection.sauvola import Mask, grey_of
 
 WINDOW_PX = 63  # N: best on our development photos (METHOD); holds cracks of up to half of it, 31 px
 WORTH_SAYING = 0.1  # a rejected candidate with a lower score is not worth a line
-GAP_LENGTHS = 0.4  # a gap within a crack is bridged up to this share of the least length of a crack
 JOINT_LENGTHS = 8.0  # what is straight over this many times the least length of a crack is a joint
 
 
@@ -76,7 +75,7 @@ def _by_network(
     raster: Raster, model: Model, min_score: float, least_px: float, on_progress: Progress | None
 ) -> DetectionArrays:
     """What a network holds for cracks, long and likely enough as a whole, less what is straight."""
-    given = candidates(probability(raster, model, on_progress), GAP_LENGTHS * least_px)
+    given = candidates(probability(raster, model, on_progress))
     long = (given.found.extent_px >= least_px) & (given.found.elongation >= ELONGATION)
     likely = given.score >= min_score
     mask, joints = without_joints(given.found.keep(long & likely), JOINT_LENGTHS * least_px, least_px)
