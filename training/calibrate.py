@@ -20,6 +20,7 @@ from schemas.raster import ArrayRaster
 from tasks.detection.candidates import EDGE, STRONGEST, SURE, features
 from tasks.detection.components import ELONGATION, components
 from tasks.detection.network import OCTAVES, Model, Probability, probability
+from training.cracks import DOUBTFUL
 from training.photos import by_fold
 
 NEAR_PX = 3
@@ -44,7 +45,7 @@ def _seen(model: Model, folder: Path, names: list[str]) -> Iterator[tuple[Probab
         bgr = cv2.imread(str(folder / "images" / name), cv2.IMREAD_COLOR)
         mask = cv2.imread(str(folder / "masks" / name), cv2.IMREAD_GRAYSCALE)
         rgb = np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
-        yield probability(ArrayRaster(rgb), model), np.asarray(mask) > 0
+        yield probability(ArrayRaster(rgb), model), np.asarray(mask) > DOUBTFUL
 
 
 def logistic(features: Floats, truth: Mask, weights: Floats, decay: float = 1e-3) -> Floats:
