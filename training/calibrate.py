@@ -45,7 +45,9 @@ def _seen(model: Model, folder: Path, names: list[str]) -> Iterator[tuple[Probab
         bgr = cv2.imread(str(folder / "images" / name), cv2.IMREAD_COLOR)
         mask = cv2.imread(str(folder / "masks" / name), cv2.IMREAD_GRAYSCALE)
         rgb = np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
-        yield probability(ArrayRaster(rgb), model), np.asarray(mask) > DOUBTFUL
+        p = probability(ArrayRaster(rgb), model)
+        p[np.asarray(mask) == DOUBTFUL] = 0  # neither found nor missed
+        yield p, np.asarray(mask) > DOUBTFUL
 
 
 def logistic(features: Floats, truth: Mask, weights: Floats, decay: float = 1e-3) -> Floats:

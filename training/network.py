@@ -55,7 +55,7 @@ class Network(nn.Module):
             nn.Conv2d(3, a, 4, 2, 1, bias=False), nn.BatchNorm2d(a), nn.ReLU(inplace=True)
         )
         self.down = nn.ModuleList()
-        for before, here, depth in zip((a, *WIDTHS), WIDTHS, DEPTHS, strict=False):
+        for before, here, depth in zip((a, *WIDTHS[:-1]), WIDTHS, DEPTHS, strict=True):
             first = Separable(before, here, 1 if len(self.down) == 0 else 2)
             self.down.append(nn.Sequential(first, *(Separable(here, here) for _ in range(depth - 1))))
         self.up = nn.ModuleList(

@@ -41,11 +41,16 @@ def read(folder: Path, names: list[str], scales: tuple[float, float], drawn: flo
         if bgr is None or mask is None:
             raise SystemExit(f"{folder}: {name} or its mask cannot be read")
         crack = ((mask > 0) & (mask != DOUBTFUL)).astype(np.uint8)
-        line = cv2.dilate(np.asarray(skeletonize(crack > 0), np.uint8), np.ones((3, 3), np.uint8))
-        truth = 255 * np.dstack([crack, line, (mask != DOUBTFUL).astype(np.uint8)])
+        truth = 255 * np.dstack([crack, _line(crack), (mask != DOUBTFUL).astype(np.uint8)])
         on_crack = np.argwhere(crack > 0)[::7].astype(np.int32)
         photos.append(Photo(name, np.ascontiguousarray(bgr[..., ::-1]), truth, on_crack, scales, drawn))
     return photos
+
+
+def _line(crack: Pixels) -> Pixels:
+    """(H, W) of 0 and 1: the centrelines, three pixels wide."""
+    thin = np.asarray(skeletonize(crack > 0), np.uint8)
+    return np.asarray(cv2.dilate(thin, np.ones((3, 3), np.uint8)), np.uint8)
 
 
 def by_fold(groups: Path) -> list[list[str]]:
@@ -88,8 +93,7 @@ def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:
     share = seen(cracks_on(rng, SIDE_PX, 1.0), SIDE_PX, SIDE_PX, 1.0)
     kept = np.exp(rng.uniform(np.log(0.12), np.log(0.88)))
     crack = (share >= VISIBLE).astype(np.uint8)
-    line = cv2.dilate(np.asarray(skeletonize(crack > 0), np.uint8), np.ones((3, 3), np.uint8))
-    both = np.maximum(truth, np.dstack([crack, line, crack]))
+    both = np.maximum(truth, np.dstack([crack, _line(crack), crack]))
     return rgb * (1.0 - share * np.float32(1.0 - kept))[..., None], both
 
 

@@ -60,8 +60,9 @@ def seen_heights(flat: Adjusted, cameras: Sequence[Camera]) -> tuple[Array, Arra
     for i in np.unique(photo):
         mine, view, camera = photo == i, flat.views[i], cameras[i]
         ideal = (flat.observations.xy[mine] - camera.principal_px) / camera.focal_px
-        undistorted = view.camera.undistort(camera.distort(ideal) * camera.focal_px / view.camera.focal_px)
-        p[mine] = view.to_plane(undistorted * view.camera.focal_px + view.camera.principal_px)
+        taken = camera.distort(ideal) * camera.focal_px + camera.principal_px
+        straight = view.camera.undistort((taken - view.camera.principal_px) / view.camera.focal_px)
+        p[mine] = view.to_plane(straight * view.camera.focal_px + view.camera.principal_px)
         g[mine] = (view.C[:2] - p[mine]) / view.C[2]
     count = np.bincount(track)[:, None]
 

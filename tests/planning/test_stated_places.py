@@ -7,8 +7,9 @@ from schemas.contract import Vector2, Vector3
 from schemas.problem import BadInput
 from schemas.settings import PlanSettings
 from schemas.structure import Structure
+from tasks.planning.plan import plan_and_prove
 from tasks.planning.stated_places import in_the_model
-from tests.planning.structures import wall
+from tests.planning.structures import CAMERA, OPEN, ORIGIN, VEHICLE, wall
 
 SHIFT: Vector3 = (691_600.0, 5_334_800.0, 0.0)
 LOW, HIGH, HOME = (-5.0, -9.0, 0.0), (4.0, -2.0, 8.0), (0.0, -6.0, 0.0)
@@ -32,6 +33,18 @@ def test_the_scans_coordinates_and_the_models_mean_the_same() -> None:
     of_scans = PlanSettings(free_m=(far,), no_fly_m=(far,), fence_m=fence)
     for settings, home in ((local, HOME), (of_scans, moved(HOME))):
         assert in_the_model(shifted(), settings, home) == (local, HOME)
+
+
+def test_a_plan_is_the_same_in_either_coordinates() -> None:
+    """And so is its fence, as the missions carry it."""
+    world, made = wall(), []
+    for structure, by in ((world.structure, (0.0, 0.0, 0.0)), (shifted(), SHIFT)):
+        air = Box(low_m=moved(OPEN.low_m, by), high_m=moved(OPEN.high_m, by))
+        fence = tuple((e + by[0], n + by[1]) for e, n in ((-60, -60), (60, -60), (60, 60), (-60, 60)))
+        settings = PlanSettings(gsd_mm_px=1.0, overlap=0.5, free_m=(air,), fence_m=fence)
+        home = moved(HOME, by)
+        made.append(plan_and_prove(structure, world.cloud, CAMERA, VEHICLE, ORIGIN, home, settings)[0])
+    assert made[0] == made[1]
 
 
 @pytest.mark.parametrize("key", ["no_fly_m", "free_m"])
