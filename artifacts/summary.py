@@ -17,7 +17,7 @@ from schemas.structure import Structure
 
 METHODS = {
     "hairline": "Hairline's own network, trained on photos and simulated surfaces; each crack with its score",
-    "ridge": "Sauvola's local threshold, its mean and deviation taken from valid pixels only",
+    "ridge": "Sauvola's local threshold, tied to the texture of the surface itself; no network",
     "onnx": "a network given by the user",
     "paper": "the published method step by step: peak detection, then Sauvola's local threshold",
     "global": "one grey-level threshold for the whole image",
