@@ -13,6 +13,9 @@ from training.cracks import DOUBTFUL, VISIBLE, cracks_on, seen
 SIDE_PX = 224
 ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
 DRAWN = 0.1  # share of the crops of photos on which further cracks are drawn: real surfaces, known cracks
+LENT = 0.25  # share of all crops on which the cracks of another photo are laid
+LENT_SCALES = (0.5, 6.0)  # seen from near they are wide, and the surface still sharp
+AROUND_PX = 41  # the surface beside a crack is told from this far around it
 FOLDS = 5
 
 Pixels = npt.NDArray[np.uint8]
@@ -22,11 +25,13 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Photo:
-    """rgb (H, W, 3); truth (H, W, 3), 0 or 255: crack, its centreline (3 px wide), whether it counts."""
+    """rgb (H, W, 3); truth (H, W, 3), 0 or 255: crack, its centreline (3 px wide), whether it counts; kept
+    (H, W), 255 × the share of light that its cracks leave of the surface's."""
 
     name: str
     rgb: Pixels
     truth: Pixels
+    kept: Pixels
     on_crack: npt.NDArray[np.int32]  # (n, 2) y, x of some pixels of the cracks
     scales: tuple[float, float]
     drawn: float  # share of its crops on which cracks are drawn
@@ -43,7 +48,8 @@ def read(folder: Path, names: list[str], scales: tuple[float, float], drawn: flo
         crack = ((mask > 0) & (mask != DOUBTFUL)).astype(np.uint8)
         truth = 255 * np.dstack([crack, _line(crack), (mask != DOUBTFUL).astype(np.uint8)])
         on_crack = np.argwhere(crack > 0)[::7].astype(np.int32)
-        photos.append(Photo(name, np.ascontiguousarray(bgr[..., ::-1]), truth, on_crack, scales, drawn))
+        rgb = np.ascontiguousarray(bgr[..., ::-1])
+        photos.append(Photo(name, rgb, truth, _kept(rgb, crack), on_crack, scales, drawn))
     return photos
 
 
@@ -51,6 +57,16 @@ def _line(crack: Pixels) -> Pixels:
     """(H, W) of 0 and 1: the centrelines, three pixels wide."""
     thin = np.asarray(skeletonize(crack > 0), np.uint8)
     return np.asarray(cv2.dilate(thin, np.ones((3, 3), np.uint8)), np.uint8)
+
+
+def _kept(rgb: Pixels, crack: Pixels) -> Pixels:
+    """255 × the light of each crack beside that of what is around it, 255 away from cracks."""
+    grey = rgb.mean(axis=2).astype(np.float32)
+    rim = cv2.dilate(crack, np.ones((5, 5), np.uint8))
+    free, size = (1 - rim).astype(np.float32), (AROUND_PX, AROUND_PX)
+    around = cv2.boxFilter(grey * free, -1, size) / np.maximum(cv2.boxFilter(free, -1, size), 1e-3)
+    kept = np.where(rim > 0, np.minimum(grey / np.maximum(around, 1.0), 1.0), 1.0)
+    return np.asarray(np.rint(255.0 * kept), np.uint8)
 
 
 def by_fold(groups: Path) -> list[list[str]]:
@@ -66,11 +82,26 @@ def by_fold(groups: Path) -> list[list[str]]:
     return [sorted(fold) for fold in folds]
 
 
-def crop(photo: Photo, rng: Rng) -> tuple[Floats, Floats]:
+def crop(photo: Photo, lender: Photo, rng: Rng) -> tuple[Floats, Floats]:
     """(3, SIDE_PX, SIDE_PX) RGB in 0..1 and (3, SIDE_PX, SIDE_PX) truth, as read() gives it."""
+    A, scale, at = _view(photo, photo.scales, ON_CRACK, rng)
+    rgb = photo.rgb if scale > 0.8 else _softened(photo.rgb, at, scale)
+    looks = _warped(rgb, A).astype(np.float32) / np.float32(255.0)
+    truth = (_warped(photo.truth, A) > 110).astype(np.float32)
+    if rng.random() < photo.drawn:
+        looks, truth = _cracked(looks, truth, rng)
+    if len(lender.on_crack) and rng.random() < LENT:
+        looks, truth = _lent(looks, truth, lender, rng)
+    return _relit(looks, rng).transpose(2, 0, 1), truth.transpose(2, 0, 1)
+
+
+def _view(
+    photo: Photo, scales: tuple[float, float], on_crack: float, rng: Rng
+) -> tuple[npt.NDArray[np.float64], float, tuple[float, float]]:
+    """The 2×3 map from the photo to a crop, its scale and the point (x, y) of the photo in its middle."""
     height, width = photo.rgb.shape[:2]
-    scale = float(np.exp(rng.uniform(*np.log(photo.scales))))
-    if len(photo.on_crack) and rng.random() < ON_CRACK:
+    scale = float(np.exp(rng.uniform(*np.log(scales))))
+    if len(photo.on_crack) and rng.random() < on_crack:
         off = rng.uniform(-0.35, 0.35, 2) * SIDE_PX / scale
         y, x = photo.on_crack[rng.integers(len(photo.on_crack))] + off
     else:
@@ -80,12 +111,22 @@ def crop(photo: Photo, rng: Rng) -> tuple[Floats, Floats]:
     flip = rng.choice([-1.0, 1.0])
     A = np.array([[c * flip, -s, 0.0], [s * flip, c, 0.0]])
     A[:, 2] = SIDE_PX / 2 - A[:, :2] @ (x, y)
-    rgb = photo.rgb if scale > 0.8 else _softened(photo.rgb, (x, y), scale)
-    looks = _warped(rgb, A).astype(np.float32) / np.float32(255.0)
-    truth = (_warped(photo.truth, A) > 110).astype(np.float32)
-    if rng.random() < photo.drawn:
-        looks, truth = _cracked(looks, truth, rng)
-    return _relit(looks, rng).transpose(2, 0, 1), truth.transpose(2, 0, 1)
+    return A, scale, (float(x), float(y))
+
+
+def _lent(rgb: Floats, truth: Floats, lender: Photo, rng: Rng) -> tuple[Floats, Floats]:
+    """The cracks of another photo on this one, lighter or darker: real shapes, other surfaces. As they were
+    where they would drown in this surface's texture."""
+    A, _, _ = _view(lender, LENT_SCALES, 1.0, rng)
+    cracks = (_warped(lender.truth, A) > 110).astype(np.float32)
+    kept = (_warped(lender.kept, A).astype(np.float32) / np.float32(255.0)) ** np.exp(rng.normal(0.0, 0.3))
+    grey = np.log(rgb.mean(axis=2) + np.float32(0.02))
+    texture = float(np.std(grey - cv2.GaussianBlur(grey, (0, 0), 8.0)))
+    dark = 1.0 - float((kept * cracks[..., 0]).sum() / max(1.0, float(cracks[..., 0].sum())))
+    if dark < 1.5 * texture:
+        return rgb, truth
+    both = np.dstack([np.maximum(truth[..., :2], cracks[..., :2]), np.maximum(truth[..., 2], cracks[..., 0])])
+    return rgb * kept[..., None].astype(np.float32), both
 
 
 def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:

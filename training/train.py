@@ -43,10 +43,14 @@ def loss_of(logit: Tensor, truth: Tensor) -> Tensor:
 def batch(photos: list[Photo], surfaces: list[Photo], seed: int) -> tuple[Tensor, Tensor]:
     rng = np.random.default_rng(seed)
     sources = [surfaces if k % 3 == 2 else photos for k in range(BATCH)]
-    pairs = [crop(source[rng.integers(len(source))], rng) for source in sources]
+    pairs = [crop(any_of(source, rng), any_of(photos, rng), rng) for source in sources]
     return torch.from_numpy(np.stack([p[0] for p in pairs])), torch.from_numpy(
         np.stack([p[1] for p in pairs])
     )
+
+
+def any_of(photos: list[Photo], rng: np.random.Generator) -> Photo:
+    return photos[rng.integers(len(photos))]
 
 
 @torch.no_grad()
@@ -90,7 +94,7 @@ def main() -> None:
     folds = by_fold(args.photos / "groups.txt")
     left_out = [] if args.fold is None else folds[args.fold]
     kept = [name for fold in folds for name in fold if name not in left_out]
-    photos = read(args.photos, kept, (0.5, 3.0), DRAWN)
+    photos = read(args.photos, kept, (0.5, 4.0), DRAWN)
     held = read(args.photos, left_out, (1.0, 1.0))
     surfaces = read(args.surfaces, sorted(p.name for p in (args.surfaces / "masks").iterdir()), (0.7, 2.0))
 

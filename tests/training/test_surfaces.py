@@ -1,7 +1,10 @@
 """What the network learns from; PyTorch is not needed for it."""
 
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import cv2
 import numpy as np
 import pytest
 
@@ -11,6 +14,8 @@ from training import surfaces
 from training.cracks import DOUBTFUL, seen
 from training.photos import ON_CRACK, SIDE_PX, Photo, by_fold, crop, read
 from training.surfaces import main, surface
+
+NOWHERE = np.zeros((0, 2), np.int32)
 
 
 def test_truth_lies_where_a_crack_is_dark(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -49,10 +54,11 @@ def test_a_crack_drawn_on_a_photo_is_dark_and_true() -> None:
     rgb = np.full((300, 300, 3), 180, np.uint8)
     truth = np.zeros((300, 300, 3), np.uint8)
     truth[..., 2] = 255
-    photo = Photo("bare", rgb, truth, np.zeros((0, 2), np.int32), (1.0, 1.0), drawn=1.0)
+    untouched = np.full((300, 300), 255, np.uint8)
+    photo = Photo("bare", rgb, truth, untouched, NOWHERE, (1.0, 1.0), drawn=1.0)
     contrast = []
     for seed in range(20):
-        looks, mask = crop(photo, np.random.default_rng(seed))
+        looks, mask = crop(photo, photo, np.random.default_rng(seed))
         assert mask[2].all() and mask[0].any()
         contrast.append(looks[:, mask[0] == 0].mean() - looks[:, mask[1] > 0].mean())
     assert np.median(contrast) > 0.1
@@ -73,16 +79,39 @@ def test_folds_of_the_real_set_are_even() -> None:
     assert sum(sizes) == 252 and max(sizes) - min(sizes) <= 3
 
 
+def _line() -> Photo:
+    """A dark crack five pixels wide across a bright photo."""
+    rgb = np.full((300, 300, 3), 180, np.uint8)
+    mask = np.zeros((300, 300), np.uint8)
+    rgb[148:153], mask[148:153] = 30, 255
+    with TemporaryDirectory() as folder:
+        for part, picture in (("images", rgb), ("masks", mask)):
+            (Path(folder) / part).mkdir()
+            cv2.imwrite(str(Path(folder) / part / "line.png"), picture)
+        (photo,) = read(Path(folder), ["line.png"], (0.5, 2.0))
+    return photo
+
+
+def test_a_lent_crack_is_dark_and_true(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cracks of one photo laid on another: as dark there beside its surface, and drawn in the truth."""
+    monkeypatch.setattr("training.photos.LENT", 1.0)
+    line = _line()
+    grey, no_crack = np.full((300, 300, 3), 120, np.uint8), np.full((300, 300, 3), [0, 0, 255], np.uint8)
+    bare = replace(line, rgb=grey, truth=no_crack, on_crack=NOWHERE)
+    contrast = []
+    for seed in range(20):
+        looks, mask = crop(bare, line, np.random.default_rng(seed))
+        assert mask[2].all() and mask[0].any()
+        contrast.append(looks[:, mask[0] == 0].mean() / max(1e-3, looks[:, mask[1] > 0].mean()))
+    assert np.median(contrast) > 2.0
+
+
 def test_a_crop_keeps_truth_on_its_crack() -> None:
     """However turned, scaled and relit: the truth stays on the dark line."""
-    rgb = np.full((300, 300, 3), 180, np.uint8)
-    truth = np.full((300, 300, 3), [0, 0, 255], np.uint8)
-    rgb[148:153], truth[148:153] = 30, 255
-    on_crack = np.argwhere(truth[..., 0] > 0).astype(np.int32)
-    photo = Photo("line", rgb, truth, on_crack, (0.5, 2.0), 0.0)
+    photo = _line()
     contrast = []
     for seed in range(30):
-        looks, mask = crop(photo, np.random.default_rng(seed))
+        looks, mask = crop(photo, photo, np.random.default_rng(seed))
         assert looks.shape == (3, SIDE_PX, SIDE_PX) and mask.shape == (3, SIDE_PX, SIDE_PX)
         assert looks.min() >= 0.0 and looks.max() <= 1.0
         if mask[0].sum() > 100:
