@@ -1,5 +1,7 @@
 """Kill the process in any stage and run the same command again: same cracks, byte for byte."""
 
+import os
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -29,17 +31,18 @@ def _cracks(folder: Path) -> bytes:
 
 
 def _kill_in(stage: str, cwd: Path) -> None:
-    """SIGKILL as soon as the line says that the stage has started."""
+    """SIGKILL, to its server too, as soon as the line says that the stage has started."""
     with subprocess.Popen(
         [str(HAIRLINE), *RUN],
         cwd=cwd,
         env=environment(cwd, PYTHONUNBUFFERED="1"),
         stdout=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     ) as process:
         assert process.stdout is not None
         deadline_s = time.monotonic() + 240
         for line in process.stdout:
             if line.strip() == f"… {stage}" or time.monotonic() > deadline_s:
                 break
-        process.kill()
+        os.killpg(process.pid, signal.SIGKILL)
