@@ -13,6 +13,7 @@ from flows.model_structure import has_scans, model
 from flows.opening import opened
 from flows.workers import one_a_core
 from schemas.camera import Camera, CameraPose
+from schemas.contract import Vector3
 from schemas.file import File
 from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
@@ -45,6 +46,7 @@ class PhotoSource:
     camera: Camera | None = None
     pose: CameraPose | None = None
     position_sigma_m: float = 5.0
+    velocity_m_s: Vector3 | None = None
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,7 @@ def _missed(log: FlightLog) -> tuple[LeftOut, ...]:
 
 def _simulated_photos(inspection: Inspection, planned: FlightPlan, log: FlightLog) -> list[PhotoSource]:
     assert inspection.simulation is not None
-    poses = {shot.photo: shot.pose for shot in log.shots}
+    shots = {shot.photo: shot for shot in log.shots}
     surfaces = sorted({point.surface for point in planned.shooting_points if point.surface})
     folders = photograph.each([(inspection.simulation, planned, surface) for surface in surfaces])
     return [
@@ -168,12 +170,14 @@ def _simulated_photos(inspection: Inspection, planned: FlightPlan, log: FlightLo
             name=entry.name,
             surface=surface,
             camera=planned.camera,
-            pose=poses.get(Path(entry.name).stem),
+            pose=shot.pose if shot else None,
             position_sigma_m=_position_sigma_m(inspection),
+            velocity_m_s=shot.velocity_m_s if shot else None,
         )
         for surface, folder in zip(surfaces, folders, strict=True)
         if not isinstance(folder, BadInput)
         for entry in folder.entries
+        for shot in [shots.get(Path(entry.name).stem)]
     ]
 
 
@@ -229,6 +233,7 @@ def _given_photos(inspection: Inspection, base: Path, log: FlightLog | None) -> 
                     camera=camera,
                     pose=shot.pose if shot else None,
                     position_sigma_m=_position_sigma_m(inspection) if shot else 5.0,
+                    velocity_m_s=shot.velocity_m_s if shot else None,
                 )
             )
     return sources

@@ -71,7 +71,9 @@ def detect_in_photos(
             raise bad[0] if bad else BadInput("photos", "none given", "List their folders under 'photos'")
         return good
 
-    taken = ingest.each((s.file, s.name, s.surface, s.camera, s.pose, s.position_sigma_m) for s in sources)
+    taken = ingest.each(
+        (s.file, s.name, s.surface, s.camera, s.pose, s.position_sigma_m, s.velocity_m_s) for s in sources
+    )
     photos = usable("photos", list(sources), taken)
     problems.extend(_control_of_nothing(inspection, {s.surface for s, _ in photos if s.stitch}))
     mosaics = _mosaics(inspection, photos, surfaces, modelled)

@@ -20,6 +20,7 @@ class Shot(Contract):
     surface: str | None
     time_s: float
     pose: CameraPose
+    velocity_m_s: Vector3 | None = None  # world ENU, from the track
     reported: bool = True  # False: the trigger's message was lost, pose interpolated from the track
 
 

@@ -21,6 +21,7 @@ class Photo(Contract):
     position_sigma_m: float = 5.0  # how far to trust the position, of pose or GPS
     gps: Vector3 | None = None  # latitude, longitude (degrees), altitude above take-off (m; 0: not known)
     view_deg: Vector3 | None = None  # yaw, pitch, roll of the camera from XMP, as in CameraPose
+    velocity_m_s: Vector3 | None = None  # world ENU, of the vehicle at the shot: from its log, or XMP
     surface: str  # the surface (or set) it belongs to
     sharpness: float  # variance of the Laplacian over that of local contrast, dimensionless; blur lowers it
     sharpness_along: Vector4 | None = None  # at 0, 90, 45 and 135°: motion lowers one; None: alike

@@ -48,7 +48,7 @@ def read(folder: Path, names: list[str], scales: tuple[float, float], drawn: flo
         crack = ((mask > 0) & (mask != DOUBTFUL)).astype(np.uint8)
         truth = 255 * np.dstack([crack, _line(crack), (mask != DOUBTFUL).astype(np.uint8)])
         on_crack = np.argwhere(crack > 0)[::7].astype(np.int32)
-        rgb = np.ascontiguousarray(bgr[..., ::-1])
+        rgb = np.ascontiguousarray(bgr[..., ::-1], np.uint8)
         photos.append(Photo(name, rgb, truth, _kept(rgb, crack), on_crack, scales, drawn))
     return photos
 
@@ -162,18 +162,18 @@ def _relit(rgb: Floats, rng: Rng) -> Floats:
         across = x * np.float32(np.cos(angle)) + y * np.float32(np.sin(angle)) - rng.uniform(-0.4, 0.4)
         edge = np.exp(rng.uniform(np.log(0.002), np.log(0.5)))
         shade = rng.uniform(0.1, 0.65) / (1.0 + np.exp(np.clip(across / edge, -40, 40)))
-        rgb = rgb * (1.0 - shade)[..., None]
-    gain = np.exp(rng.normal(0.0, 0.3) + rng.normal(0.0, 0.06, 3))
-    rgb = np.clip(rgb * gain, 1e-3, 1.0) ** np.exp(rng.normal(0.0, 0.25))
-    grey = rgb.mean(axis=2, keepdims=True)
+        rgb = rgb * (1.0 - shade).astype(np.float32)[..., None]
+    gain = np.exp(rng.normal(0.0, 0.3) + rng.normal(0.0, 0.06, 3)).astype(np.float32)
+    rgb = np.clip(rgb * gain, np.float32(1e-3), np.float32(1.0)) ** np.float32(np.exp(rng.normal(0.0, 0.25)))
+    grey = rgb @ np.full((3, 1), 1 / 3, np.float32)
     if rng.random() < 0.5:
-        rgb = grey + (rgb - grey) * rng.choice([0.0, rng.uniform(0.0, 1.6)])
+        rgb = grey + (rgb - grey) * np.float32(rng.choice([0.0, rng.uniform(0.0, 1.6)]))
     middle = grey.mean()
-    rgb = middle + (rgb - middle) * np.exp(rng.normal(0.0, 0.25))
+    rgb = middle + (rgb - middle) * np.float32(np.exp(rng.normal(0.0, 0.25)))
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rng.random() < 0.5:
         soft = np.asarray(cv2.GaussianBlur(rgb, (0, 0), float(rng.uniform(0.4, 1.3))), np.float32)
-        rgb = soft if rng.random() < 0.7 else rgb + rng.uniform(0.3, 1.0) * (rgb - soft)
+        rgb = soft if rng.random() < 0.7 else rgb + np.float32(rng.uniform(0.3, 1.0)) * (rgb - soft)
     if rng.random() < 0.6:
         fine = rng.standard_normal(rgb.shape, np.float32)
         if rng.random() < 0.5:

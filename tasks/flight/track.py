@@ -1,5 +1,6 @@
 """Planned against flown: where the vehicle was, what it photographed, and how far it was off (paper, 4.1)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from tasks.flight.shots import match_shots, planned_shots, unnamed_shots
 
 Array = npt.NDArray[np.float64]
 
+AROUND_S = 0.6  # of a shot: how long positions tell its speed
 ELSEWHERE_M = 2000.0  # a log this far from the plan belongs to another place
 
 
@@ -47,7 +49,8 @@ def compare_with_plan(recording: Recording, plan: FlightPlan | None, name: str) 
     duration = round(max(end - start, float(time_s[-1])), 3)
     triggers = [t for t in recording.triggers if _in_flight(t.fix.time_s, recording)]
     if plan is None:
-        return Comparison(track, unnamed_shots(triggers, start, place), (), (), duration)
+        shots = with_velocity(unnamed_shots(triggers, start, place), time_s, at_m)
+        return Comparison(track, shots, (), (), duration)
     away_m = float(np.linalg.norm(at_m - plan.home_m, axis=1).min())
     if away_m > ELSEWHERE_M:
         raise BadInput(
@@ -61,7 +64,21 @@ def compare_with_plan(recording: Recording, plan: FlightPlan | None, name: str) 
     left_s = {shooting[number]: triggers[t].fix.time_s - start for number, t in known.items()}
     leg = legs_of(at_m, corners, *legs_between(time_s, left_s, last=len(corners) - 2))
     shots, missed = planned_shots(plan, triggers, known, track, leg, start, place)
-    return Comparison(track, shots, _errors(plan, at_m, corners, leg), missed, duration)
+    errors = _errors(plan, at_m, corners, leg)
+    return Comparison(track, with_velocity(shots, time_s, at_m), errors, missed, duration)
+
+
+def with_velocity(shots: Sequence[Shot], time_s: Array, at_m: Array) -> tuple[Shot, ...]:
+    """The shots with the slope of the track's positions, (n, 3) at (n,) seconds, around each."""
+    known = []
+    for shot in shots:
+        near = np.abs(time_s - shot.time_s) <= AROUND_S
+        slope = None
+        if near.any() and time_s[near].min() <= shot.time_s <= time_s[near].max() and near.sum() >= 3:
+            fitted = np.polynomial.polynomial.polyfit(time_s[near] - shot.time_s, at_m[near], 1)
+            slope = _vector(fitted[1])
+        known.append(shot.model_copy(update={"velocity_m_s": slope}))
+    return tuple(known)
 
 
 def _in_flight(time_s: float, recording: Recording) -> bool:

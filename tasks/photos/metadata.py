@@ -22,6 +22,7 @@ class Metadata:
     calibrated_focal_px: float | None  # DJI's own calibration
     gps: Vector3 | None  # latitude, longitude (degrees), altitude above take-off (m; 0: not known)
     view_deg: Vector3 | None  # yaw, pitch, roll of the gimbal
+    velocity_m_s: Vector3 | None = None  # east, north, up
     metered_ev: float | None = None  # log2 of exposure time (s) · ISO / 100 / f-number²
 
 
@@ -39,6 +40,7 @@ def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
         calibrated_focal_px=_positive(_xmp(xmp, "CalibratedFocalLength")),
         gps=_gps(_ifd(exif, _GPS_IFD), _xmp(xmp, "RelativeAltitude")),
         view_deg=None if yaw is None or pitch is None else _view(yaw, pitch, roll or 0.0),
+        velocity_m_s=_velocity(xmp),
         metered_ev=_metered_ev(camera),
     )
 
@@ -51,6 +53,12 @@ def _metered_ev(camera: dict[int, object]) -> float | None:
     if seconds is None or speed is None or f_number is None:
         return None
     return math.log2(seconds * speed / 100.0 / f_number**2)
+
+
+def _velocity(xmp: bytes) -> Vector3 | None:
+    """DJI writes it along north, east and down."""
+    north, east, down = (_xmp(xmp, f"Flight{axis}Speed") for axis in "XYZ")
+    return None if north is None or east is None or down is None else (east, north, -down)
 
 
 def _view(yaw: float, pitch: float, roll: float) -> Vector3 | None:

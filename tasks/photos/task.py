@@ -14,6 +14,7 @@ from schemas.arrival import Arrival
 from schemas.assigned_shot import AssignedShot
 from schemas.calibration import Calibration
 from schemas.camera import Camera, CameraPose
+from schemas.contract import Vector3
 from schemas.file import File
 from schemas.flight_log import FlightLog
 from schemas.flight_plan import FlightPlan
@@ -33,6 +34,7 @@ def ingest(
     camera: Camera | None,
     pose: CameraPose | None,
     position_sigma_m: float,
+    velocity_m_s: Vector3 | None = None,
 ) -> Photo:
     """Decode, set upright, measure; camera from EXIF where none is given. Raises BadInput by name."""
     from tasks.photos.intrinsics import camera_from_metadata, camera_of_photo
@@ -64,6 +66,7 @@ def ingest(
         position_sigma_m=position_sigma_m,
         gps=metadata.gps,
         view_deg=metadata.view_deg,
+        velocity_m_s=velocity_m_s or metadata.velocity_m_s,
         surface=surface,
         sharpness=sharp,
         sharpness_along=along,

@@ -27,8 +27,9 @@ from tasks.stitching.bundle import (
 )
 from tasks.stitching.normal_equations import damped_step
 from tasks.stitching.prior import Prior
+from tasks.stitching.shutter import NO_ROLL, expected_roll, learnt_roll
 from tasks.stitching.tracks import Observations
-from tasks.stitching.uncertainty import LEAST_ROLL_PX, Certainty, certainty_of, learnt_roll, noise
+from tasks.stitching.uncertainty import Certainty, certainty_of, noise
 from tasks.stitching.view import Array, View
 
 # Each round adjusts, then drops outliers. Residuals are taken for at least this uncertain (px): wide weights
@@ -41,7 +42,6 @@ ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens) un
 CAUCHY = 2.5  # residuals of this many sigma count half
 OUTLIER = 5.0  # and those of this many are dropped at the end
 LARGEST_ROLL = 0.004  # of the photo's height: 1σ of a rolling shutter's effect before any was seen
-NO_ROLL = np.full(2, LEAST_ROLL_PX)
 FAR = 3.0  # positions off by so many sigma count half: some photo bears another's
 
 
@@ -80,9 +80,10 @@ def adjust(
     )
     sigma, residual, variance = 0.0, np.zeros((0, 2)), ALIKE * LEAST_SIGMA_PX[0] ** 2
     sigma_roll = np.full(2, LARGEST_ROLL * max(c.height_px for c in cameras))
+    expected = np.zeros_like(state.roll)
     for round_, least_sigma in enumerate(LEAST_SIGMA_PX):
         sigmas = [focal_sigmas[i] for i in seen]
-        bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll)
+        bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll, expected)
         state = replace(state, X=points(state, bundle))
         state, residual, sigma = _iterate(state, bundle, least_sigma, variance)
         weight, trust = _robust(residual, sigma), _trust(state, bundle)
@@ -93,7 +94,8 @@ def adjust(
             current = current.where(good)
         if round_ == len(LEAST_SIGMA_PX) - 2:  # once, before anything was held back: it would shrink further
             if _is_told(state, bundle, least_sigma, variance):
-                sigma_roll = learnt_roll(state, bundle, weight / variance, trust)
+                expected = expected_roll(state, bundle)
+                sigma_roll = learnt_roll(state, bundle, expected, weight / variance, trust)
             else:
                 sigma_roll, state = NO_ROLL, replace(state, roll=np.zeros_like(state.roll))
     adjusted = list(views)
@@ -180,7 +182,7 @@ def _cost(state: State, bundle: Bundle, residual: Array, sigma: float, variance:
         FAR**2 * np.log1p(_far(state, bundle)).sum(),
         (bundle.weight_rotation * turned**2).sum(),
         (bundle.weight_bias * state.bias**2).sum(),
-        ((state.roll / bundle.sigma_roll) ** 2).sum(),
+        (((state.roll - bundle.expected_roll) / bundle.sigma_roll) ** 2).sum(),
         (((state.lens - nominal_lens(bundle.cameras)) / sigma_lens(bundle)) ** 2).sum(),
     )
     return float(sum(terms))

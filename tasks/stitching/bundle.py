@@ -47,7 +47,9 @@ class Bundle:
     weight_rotation: Array  # (n, 3) 1/σ²; 0: not known
     weight_position: Array  # (n, 3)
     weight_bias: Array  # (3,)
+    velocity: Array  # (n, 3) plane units a second; NaN: not known
     sigma_roll: Array  # (2,) px
+    expected_roll: Array  # (n, 2) px
     relief: HeightMap | None
 
     @property
@@ -68,6 +70,7 @@ def build_bundle(
     sigma_bias: Array,
     focal_sigmas: Sequence[float],
     sigma_roll: Array,
+    expected_roll: Array,
 ) -> Bundle:
     keys = [camera_key(camera) for camera in cameras]
     camera_of = np.array([keys.index(camera_key(v.camera)) for v in views], np.int64)
@@ -102,7 +105,9 @@ def build_bundle(
         weight_rotation=np.where(np.isfinite(rotations), rotations, np.inf) ** -2.0,
         weight_position=np.where(np.isfinite(position), position, np.inf) ** -2.0,
         weight_bias=np.maximum(sigma_bias, 1e-9) ** -2.0,
+        velocity=np.stack([p.velocity for p in priors]),
         sigma_roll=sigma_roll,
+        expected_roll=expected_roll,
         relief=views[0].relief,
     )
 
@@ -170,7 +175,21 @@ def residuals(state: State, bundle: Bundle) -> Array:
         mine = of == c
         camera = with_lens(nominal, state.lens[c])
         residual[mine] += camera.distort(xy[mine]) * camera.focal_px + camera.principal_px
-    return residual
+    return _as_taken(residual, state, bundle)
+
+
+def _as_taken(off: Array, state: State, bundle: Bundle) -> Array:
+    """(M, 2) or (M, 2, K) in pixels of the photo as taken, of what the row that was seen, rather than the row
+    foretold, makes of the rolling shutter: left so, noise in the rows would shrink as the shutter's stretch
+    grows, and stretch every photo."""
+    slope = _roll_per_row(state, bundle).reshape(len(off), 2, *(1,) * (off.ndim - 2))
+    y = off[:, 1] / (1.0 - slope[:, 1])
+    return np.stack([off[:, 0] + slope[:, 0] * y, y], axis=1)
+
+
+def _roll_per_row(state: State, bundle: Bundle) -> Array:
+    height = np.array([c.height_px for c in bundle.cameras])[bundle.camera_of]
+    return np.asarray((state.roll / height[:, None])[bundle.photo])
 
 
 @dataclass(frozen=True)
@@ -207,12 +226,14 @@ def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
     if bundle.relief is not None:  # a point that moves on the surface rises and falls with it
         along = along + moving[:, :, 2:] * bundle.relief.slope(state.X)[bundle.track][:, None, :]
     shifts = np.broadcast_to(np.eye(2), (len(x), 2, 2))
-    rolling = bundle.rolled[:, None, None] * np.eye(2)
-    residual = (
-        focal[:, None] * distorted + state.lens[of, 2:] + state.roll[bundle.photo] * bundle.rolled[:, None]
-    )
-    return residual - bundle.xy, Jacobians(
-        pose=np.concatenate([by_camera @ turning, -moving, rolling], axis=2),
-        lens=np.concatenate([focal[:, None, None] * np.stack([distorted, by_k1], axis=2), shifts], axis=2),
-        point=np.ascontiguousarray(along),
+    seen = focal[:, None] * distorted + state.lens[of, 2:] + state.roll[bundle.photo] * bundle.rolled[:, None]
+    residual = _as_taken(seen - bundle.xy, state, bundle)
+    height = np.array([c.height_px for c in bundle.cameras])[of]
+    foretold = bundle.rolled + residual[:, 1] / height  # of the row
+    pose = np.concatenate([by_camera @ turning, -moving, foretold[:, None, None] * np.eye(2)], axis=2)
+    lens_too = np.concatenate([focal[:, None, None] * np.stack([distorted, by_k1], axis=2), shifts], axis=2)
+    return residual, Jacobians(
+        pose=_as_taken(pose, state, bundle),
+        lens=_as_taken(lens_too, state, bundle),
+        point=np.ascontiguousarray(_as_taken(along, state, bundle)),
     )

@@ -169,7 +169,7 @@ def _add_priors(A: Array, g: Array, state: State, bundle: Bundle, trust: Array) 
     rolling = np.broadcast_to(bundle.sigma_roll**-2.0, (n, 2))
     weight = np.concatenate([bundle.weight_rotation, position, rolling], axis=1)
     A[own, own] += weight
-    g[own] += weight * np.concatenate([turned, moved, state.roll], axis=1)
+    g[own] += weight * np.concatenate([turned, moved, state.roll - bundle.expected_roll], axis=1)
     bias = np.arange(size - 3, size)
     A[own[:, 3:6], bias] -= position
     A[bias, own[:, 3:6]] -= position

@@ -3,7 +3,7 @@
 Positions are as weak as they truly are: they choose candidates, anchor scale and place, and no more."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from tasks.stitching.view import FACING, Array, View
 TILT_DEG = 2.0  # gimbal and compass
 COMPASS_DEG = 10.0
 SPREAD_SIGMAS = 2.0  # of the positions' error: from here on positions tell the yaw
+UNKNOWN = np.full(3, np.nan)
 GUESSED_TILT_DEG = 8.0  # nobody said where the camera looked: at the surface, roughly
 
 
@@ -24,6 +25,7 @@ class Prior:
     view: View
     sigma_position: Array  # (3,) along u, v, w; inf: not known
     sigma_rotation: Array  # (3,) radians, about the camera's x, y (tilts) and z (view axis); inf: not known
+    velocity: Array = field(default_factory=lambda: UNKNOWN)  # (3,) units a second along u, v, w
 
     @property
     def has_position(self) -> bool:
@@ -93,7 +95,11 @@ def _from_pose(photo: Photo, R_world_plane: Array, origin: Array, sigma_w: float
     if view.C[2] <= 0 or view.R[2, 2] > -0.17:  # behind the surface, or looking along it (80°)
         return _facing(photo, 1.0)
     sigma = np.array([photo.position_sigma_m, photo.position_sigma_m, sigma_w])
-    return Prior(view, sigma, np.radians([TILT_DEG, TILT_DEG, TILT_DEG]))
+    return Prior(view, sigma, np.radians([TILT_DEG, TILT_DEG, TILT_DEG]), _velocity(photo, R_world_plane))
+
+
+def _velocity(photo: Photo, R_world_plane: Array) -> Array:
+    return UNKNOWN if photo.velocity_m_s is None else np.asarray(photo.velocity_m_s) @ R_world_plane
 
 
 def _looks_down(poses: Sequence[CameraPose]) -> bool:
@@ -175,4 +181,5 @@ def _from_gps(photo: Photo, origin: GeoOrigin, usual_altitude_m: float | None, t
     if pose.R_world_camera[2, 2] > -0.17:
         return _facing(photo, height)
     view = View(photo.camera, pose.R_world_camera, np.array([east, north, height]))
-    return Prior(view, position, np.array([tilt, tilt, np.radians(COMPASS_DEG) if trust_yaw else np.inf]))
+    turned = np.array([tilt, tilt, np.radians(COMPASS_DEG) if trust_yaw else np.inf])
+    return Prior(view, position, turned, _velocity(photo, np.eye(3)))

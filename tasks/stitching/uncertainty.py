@@ -10,7 +10,6 @@ from tasks.stitching.skyline import solve_positive
 from tasks.stitching.tracks import Index
 from tasks.stitching.view import Array
 
-LEAST_ROLL_PX = 0.02  # 1σ; less cannot be told from none
 CELLS = (4, 3)  # across and down a photo: residuals within one err alike (relief, lens, shutter)
 FEWEST = 4  # observations that make a cell's mean worth looking at
 
@@ -22,22 +21,6 @@ class Certainty:
     relative: Array  # (n, 2, 2) of where a photo's middle lies, after the best similarity of all
     absolute: Array  # (n, 2, 2) of where it lies on the plane
     scale: float  # 1σ of the whole's scale, relative
-
-
-def learnt_roll(state: State, bundle: Bundle, weight: Array, trust: Array) -> Array:
-    """(2,) 1σ in pixels of what the rolling shutter does in x and y: squares found over how many of the
-    numbers the data determined (MacKay 1992), less two, since a variance learnt from few is itself unsure
-    (the mean of its inverse-χ² distribution)."""
-    n = len(state.C)
-    residual, jacobians = linearise(state, bundle)
-    system = reduced(state, bundle, residual, jacobians, weight, trust, 0.0)
-    unit = np.zeros((len(system.g), 2 * n))
-    own = PER_PHOTO * np.arange(n)[:, None] + [6, 7]
-    unit[own.ravel(), np.arange(2 * n)] = 1.0
-    variance = np.einsum("ik,ik->k", unit, solve_positive(system.S, unit, bundle.shared)).reshape(n, 2)
-    determined = (1.0 - variance / bundle.sigma_roll**2).sum(axis=0)
-    found = np.sqrt((state.roll**2).sum(axis=0) / (determined - 2.0).clip(1.0))
-    return np.asarray(found.clip(LEAST_ROLL_PX))
 
 
 def certainty_of(state: State, bundle: Bundle, weight: Array, trust: Array) -> Certainty:

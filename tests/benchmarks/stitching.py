@@ -40,6 +40,7 @@ BARS = {
     "plane": (0.15, 1.0),
     "k1": (0.3, None),
     "rolling": (0.5, None),
+    "rolling-blind": (0.5, None),
     "relief-scan": (1.5, None),
 }  # px RMS, px worst
 GROWTH_GRIDS = ((6, 5), (10, 9), (20, 15))  # columns and rows
@@ -72,6 +73,7 @@ def run(photos: WallPhotos) -> Run:
                     photos.camera,
                     photos.poses[path.name],
                     photos.position_sigma_m,
+                    photos.velocities_m_s[path.name],
                 )
             )
         except BadInput as problem:

@@ -16,6 +16,7 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from schemas.camera import Camera, CameraPose
+from schemas.contract import Vector3
 from schemas.geodesy import GeoOrigin
 from tasks.simulation.concrete import concrete
 from tasks.simulation.crack import CrackShape, crack
@@ -47,6 +48,7 @@ class Case:
     centre: float = 0.0  # of the focal length: how far the lens lies off the sensor's middle, either way
     readout_s: float = 0.0
     speed_m_s: float = 0.0
+    speed_sigma_m_s: float | None = None  # how well the flight log tells the speed along each axis, if at all
     relief_m: float = 0.0  # from the lowest to the highest point
     scanned: bool = False  # the relief is known from a laser scan
     surface: str = "concrete"  # "faint", "tiles"
@@ -61,7 +63,14 @@ CASES = (
     Case("plane", "plane, global shutter"),
     Case("k1", "k1 = −0.05 unknown", k1=-0.05),
     Case("centre", "k1 = −0.05 and a lens off its middle, unknown", k1=-0.05, centre=0.004),
-    Case("rolling", "rolling shutter 30 ms at 0.1 m/s", readout_s=0.03, speed_m_s=0.1),
+    Case(
+        "rolling",
+        "rolling shutter 30 ms at 0.1 m/s, logged to 3 cm/s",
+        readout_s=0.03,
+        speed_m_s=0.1,
+        speed_sigma_m_s=0.03,
+    ),
+    Case("rolling-blind", "rolling shutter 30 ms at 0.1 m/s, no log", readout_s=0.03, speed_m_s=0.1),
     Case("relief", "3 cm of relief, no scan", relief_m=0.03),
     Case("relief-scan", "3 cm of relief, scanned", relief_m=0.03, scanned=True),
     Case("cracks", "cracked wall", cracks_a_m2=0.6),
@@ -89,6 +98,7 @@ class WallPhotos:
     face: Face
     poses: dict[str, CameraPose]  # as reported, by file name
     position_sigma_m: float
+    velocities_m_s: dict[str, Vector3 | None]  # as logged, by file name
     truth: dict[str, Shown]  # of the photos that belong to the wall
     scan_m: Array | None  # (N, 3) world points, as a registered model has them
     cracks: tuple[CrackShape, ...]
@@ -102,7 +112,7 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
     nominal = Camera(width_px=width, height_px=int(width * ASPECT), focal_px=FOCAL * width, k1=-0.02)
     said = folder / "set.json"
     face = _face(nominal, columns, rows)
-    rng = np.random.default_rng([seed, *case.name.encode()])
+    rng = np.random.default_rng([seed, *case.name.split("-")[0].encode()])  # as named before the dash
     scene = _scene(case, face, nominal, seed)
     true_camera = _true_camera(case, scene.true_camera)
     shots = _shots(case, true_camera, face, columns, rows, rng)
@@ -112,13 +122,18 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
     bias = rng.normal(0.0, case.position_sigma_m * 0.7, 3)
     exposed = np.exp(rng.uniform(np.log(1 - case.gain), np.log(1 + case.gain), len(shots)))
     relief = _relief(case, face, seed)
-    poses, truth = {}, {}
+    log = np.random.default_rng([seed, 17])
+    poses, velocities, truth = {}, dict[str, Vector3 | None](), {}
     for name, shot, gain in zip(names, shots, exposed, strict=True):
         off = bias + rng.normal(0.0, case.position_sigma_m * 0.7, 3)
         position = np.asarray(shot.pose.position_m) + off
         poses[name] = CameraPose(
             position_m=(position[0], position[1], position[2]), yaw_deg=0.0, pitch_deg=0.0
         )
+        velocities[name] = None
+        if case.speed_sigma_m_s is not None:
+            x, y, z = shot.motion.velocity_m_s + log.normal(0.0, case.speed_sigma_m_s, 3)
+            velocities[name] = (float(x), float(y), float(z))
         px, see = _grid(true_camera), partial(_seen, true_camera, shot, face, relief)
         truth[name] = Shown(px, see(px), float(gain), see)
     if not said.is_file():
@@ -136,9 +151,19 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
     intruders = tuple(n for n in json.loads(said.read_text()) if n not in truth)
     for name in intruders:
         poses[name] = poses[names[INTRUDED[name]]]
+        velocities[name] = velocities[names[INTRUDED[name]]]
     scan = _scanned(relief, face, seed) if case.scanned else None
     return WallPhotos(
-        folder, nominal, face, poses, case.position_sigma_m, truth, scan, _cracks(case, face, seed), intruders
+        folder,
+        nominal,
+        face,
+        poses,
+        case.position_sigma_m,
+        velocities,
+        truth,
+        scan,
+        _cracks(case, face, seed),
+        intruders,
     )
 
 

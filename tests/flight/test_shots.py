@@ -8,7 +8,7 @@ from schemas.mission import mission_items
 from tasks.flight.place import Place
 from tasks.flight.recording import Fix, Recording, Trigger
 from tasks.flight.shots import match_shots, unnamed_shots
-from tasks.flight.track import compare_with_plan
+from tasks.flight.track import compare_with_plan, with_velocity
 from tasks.simulation.trajectory import Flown, fly_mission
 from tests.flight.wall_plan import wall_plan
 
@@ -52,6 +52,18 @@ def test_every_shot_gets_its_photo_pose_and_time() -> None:
         assert (shot.pose.pitch_deg, shot.surface) == (way.pitch_deg, way.surface)
         assert shot.time_s == pytest.approx(true.time_s, abs=1e-3)
         assert shot.reported
+
+
+def test_speed_at_a_shot_is_that_of_the_track() -> None:
+    """Fixes five times a second, a centimetre off; none around the last shot."""
+    shots = compare_with_plan(recorded(PLAN, FLOWN), PLAN, "log").shots[:2]
+    time_s = np.arange(0.0, 60.0, 0.2)
+    at_m = np.column_stack([np.sin(time_s / 2), 0.3 * time_s, 0.0 * time_s])
+    at_m += np.random.default_rng(3).normal(0.0, 0.01, at_m.shape)
+    known = [shot.model_copy(update={"time_s": t}) for shot, t in zip(shots, (10.03, 70.0), strict=True)]
+    moving, unknown = with_velocity(known, time_s, at_m)
+    assert moving.velocity_m_s == pytest.approx((np.cos(5.015) / 2, 0.3, 0.0), abs=0.03)
+    assert unknown.velocity_m_s is None
 
 
 @settings(max_examples=25)

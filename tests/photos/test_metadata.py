@@ -36,6 +36,12 @@ def test_place_and_view_of_a_dji_photo() -> None:
     assert (found.focal_mm, found.focal_35mm) == (3.61, 20.0)
 
 
+def test_speed_of_a_dji_photo_is_east_north_up() -> None:
+    speeds = b'drone-dji:FlightXSpeed="+3.0" drone-dji:FlightYSpeed="-1.5" drone-dji:FlightZSpeed="+0.2"'
+    assert read_metadata(Image.Exif(), speeds).velocity_m_s == (-1.5, 3.0, -0.2)
+    assert read_metadata(Image.Exif(), speeds.replace(b"ZSpeed", b"ZSpin")).velocity_m_s is None
+
+
 @pytest.mark.parametrize(
     ("camera", "ev"),
     [
