@@ -86,6 +86,20 @@ def one_crack(
     return CrackShape("c", None, uv[:n], left, right, light)
 
 
+def ragged_joint(rng: Rng, start: Array, end: Array, width_m: float, kept: float, px_m: float) -> CrackShape:
+    """No crack: where two days' pours meet, dark and straight, with ragged edges."""
+    n = int(np.linalg.norm(end - start) / (2.0 * px_m))
+    along = (end - start) / np.linalg.norm(end - start)
+    off_m = px_m * (rng.uniform(0.2, 1.2) * walk(rng, n, 4.0) + rng.uniform(0.3, 2.0) * walk(rng, n, 25.0))
+    uv = start + np.linspace(0.0, 1.0, n)[:, None] * (end - start)
+    uv += off_m[:, None] * np.array([-along[1], along[0]])
+    left, right = (
+        0.5 * width_m * np.exp(0.6 * walk(rng, n, rng.uniform(2.0, 12.0)) + 0.3 * walk(rng, n, 60.0))
+        for _ in range(2)
+    )
+    return CrackShape("joint", None, uv, left, right, np.clip(kept + 0.15 * walk(rng, n, 8.0), 0.05, 0.95))
+
+
 def walk(rng: Rng, n: int, length: float) -> Array:
     """(n,) Gaussian noise of unit variance, correlated over `length` samples."""
     pad = int(4 * length) + 2

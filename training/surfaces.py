@@ -22,7 +22,7 @@ from tasks.simulation.light import LightMap
 from tasks.simulation.marks import Shapes, discs, in_cells, line, painted_box, painted_disc, segments
 from tasks.simulation.sensor import automatic_gain, develop
 from tasks.simulation.skin import Floats, Rgb, Skin, blotch, fine_grain, streak
-from training.cracks import DOUBTFUL, VISIBLE, Cracks, cracks_on, one_crack, seen, walk
+from training.cracks import DOUBTFUL, VISIBLE, Cracks, cracks_on, one_crack, ragged_joint, seen, walk
 
 SIDE_PX = 640
 FOCAL_PX = 4000.0
@@ -129,7 +129,7 @@ def _joints(rng: Rng, tone: Floats, side_m: float, px_m: float, texel_m: float) 
         width_m = rng.uniform(0.8, 6.0) * px_m
         kept = rng.uniform(0.15, 0.85) if rng.random() < 0.8 else rng.uniform(1.1, 1.4)
         if rng.random() < RAGGED:
-            shapes.append(_ragged(rng, start, end, width_m, min(kept, 0.8), px_m).shapes)
+            shapes.append(ragged_joint(rng, start, end, width_m, min(kept, 0.8), px_m).shapes)
             if rng.random() < 0.5:
                 _drips(rng, tone, start, end, px_m, texel_m)
             continue
@@ -140,19 +140,6 @@ def _joints(rng: Rng, tone: Floats, side_m: float, px_m: float, texel_m: float) 
         side = (columns - start[0]) * -np.sin(angle) + (rows - start[1]) * np.cos(angle) > 0
         tone[side] *= np.float32(np.exp(rng.normal(0.0, 0.06)))
     return shapes
-
-
-def _ragged(rng: Rng, start: Array, end: Array, width_m: float, kept: float, px_m: float) -> CrackShape:
-    n = int(np.linalg.norm(end - start) / (2.0 * px_m))
-    along = (end - start) / np.linalg.norm(end - start)
-    off_m = px_m * (rng.uniform(0.2, 1.2) * walk(rng, n, 4.0) + rng.uniform(0.3, 2.0) * walk(rng, n, 25.0))
-    uv = start + np.linspace(0.0, 1.0, n)[:, None] * (end - start)
-    uv += off_m[:, None] * np.array([-along[1], along[0]])
-    left, right = (
-        0.5 * width_m * np.exp(0.6 * walk(rng, n, rng.uniform(2.0, 12.0)) + 0.3 * walk(rng, n, 60.0))
-        for _ in range(2)
-    )
-    return CrackShape("joint", None, uv, left, right, np.clip(kept + 0.15 * walk(rng, n, 8.0), 0.05, 0.95))
 
 
 def _drips(rng: Rng, tone: Floats, start: Array, end: Array, px_m: float, texel_m: float) -> None:
