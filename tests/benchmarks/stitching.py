@@ -29,7 +29,7 @@ from tasks.photos.task import features, ingest
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.task import stitch
 from tasks.surfaces.task import measure_relief
-from tests.benchmarks import beach_rows
+from tests.benchmarks import beach_rows, mosaic_size_rows
 from tests.benchmarks.mosaic_truth import errors, heights_of, on_crack, seam_steps_px
 from tests.benchmarks.stitchers import NEEDS, PEERS, run_peer
 from tests.benchmarks.wall_photos import CASES, Case, WallPhotos, wall_photos
@@ -251,6 +251,9 @@ def main() -> None:
     asked.add_argument("--grid", type=int, nargs=2, default=(4, 3))
     asked.add_argument("--no-peers", action="store_true")
     asked.add_argument("--growth", action="store_true", help="CPU time from 30 to 300 photos")
+    asked.add_argument(
+        "--large", type=int, nargs=2, metavar=("COLUMNS", "ROWS"), help="memory at 12 MP a photo"
+    )
     asked.add_argument("--beach", action="store_true", help="the real photos, at full size")
     asked.add_argument("--megapixels", type=float, default=2.0)
     given = asked.parse_args()
@@ -261,6 +264,10 @@ def main() -> None:
     if given.growth:
         table += growth_rows(megapixels, given.cache)
         for line in table:
+            _tell(line)
+    if given.large:
+        for line in mosaic_size_rows.rows(*given.large, given.cache):
+            table.append(line)
             _tell(line)
     if given.beach:
         for line in beach_rows.rows():
