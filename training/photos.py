@@ -8,12 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from skimage.morphology import skeletonize
 
-from training.cracks import DOUBTFUL, VISIBLE, cracks_on, ragged_joint, seen, walk
+from training.cracks import DOUBTFUL, VISIBLE, cracks_on, seen
 
 SIDE_PX = 224
 ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
 DRAWN = 0.1  # share of the crops of photos on which further cracks are drawn: real surfaces, known cracks
-JOINTED = 0.06  # share of the crops of photos across which a joint is drawn, which is no crack
 LENT = 0.25  # share of all crops on which the cracks of another photo are laid
 LENT_SCALES = (0.5, 6.0)  # seen from near they are wide, and the surface still sharp
 AROUND_PX = 41  # the surface beside a crack is told from this far around it
@@ -89,8 +88,6 @@ def crop(photo: Photo, lender: Photo, rng: Rng) -> tuple[Floats, Floats]:
     rgb = photo.rgb if scale > 0.8 else _softened(photo.rgb, at, scale)
     looks = _warped(rgb, A).astype(np.float32) / np.float32(255.0)
     truth = (_warped(photo.truth, A) > 110).astype(np.float32)
-    if photo.drawn and rng.random() < JOINTED:
-        looks = _jointed(looks, rng)
     if rng.random() < photo.drawn:
         looks, truth = _cracked(looks, truth, rng)
     if len(lender.on_crack) and rng.random() < LENT:
@@ -130,24 +127,6 @@ def _lent(rgb: Floats, truth: Floats, lender: Photo, rng: Rng) -> tuple[Floats, 
         return rgb, truth
     both = np.dstack([np.maximum(truth[..., :2], cracks[..., :2]), np.maximum(truth[..., 2], cracks[..., 0])])
     return rgb * kept[..., None].astype(np.float32), both
-
-
-def _jointed(rgb: Floats, rng: Rng) -> Floats:
-    """A ragged joint across the crop: the tone changes there, and water has run down from it."""
-    angle, middle = rng.uniform(0, 2 * np.pi), rng.uniform(0.15, 0.85, 2) * SIDE_PX
-    along = np.array([np.cos(angle), np.sin(angle)])
-    start, end = middle - 1.5 * SIDE_PX * along, middle + 1.5 * SIDE_PX * along
-    width_px, kept = np.exp(rng.uniform(np.log(1.0), np.log(10.0))), rng.uniform(0.2, 0.8)
-    joint = ragged_joint(rng, start, end, float(width_px), float(kept), 1.0)
-    light = 1.0 - (1.0 - np.float32(kept)) * seen((joint,), SIDE_PX, SIDE_PX, 1.0)
-    x, up = np.meshgrid(np.arange(SIDE_PX), SIDE_PX - 1.0 - np.arange(SIDE_PX))
-    away = along[0] * (up - middle[1]) - along[1] * (x - middle[0])
-    place = np.clip(along[0] * (x - middle[0]) + along[1] * (up - middle[1]) + SIDE_PX, 0, 2 * SIDE_PX - 1)
-    runs = np.abs(walk(rng, 2 * SIDE_PX, rng.uniform(1.5, 10.0)))[place.astype(int)]
-    reach = np.exp(rng.uniform(np.log(10.0), np.log(150.0)))
-    wet = rng.uniform(0.0, 0.35) * runs * np.exp(-np.clip(away, 0, None) / reach) + rng.normal(0.0, 0.18)
-    light = light * np.where(away > 0, np.exp(-np.clip(wet, -0.4, 1.0)), 1.0).astype(np.float32)
-    return np.asarray(rgb * light[..., None], np.float32)
 
 
 def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:

@@ -79,21 +79,6 @@ def test_folds_of_the_real_set_are_even() -> None:
     assert sum(sizes) == 252 and max(sizes) - min(sizes) <= 3
 
 
-def test_a_joint_drawn_on_a_photo_is_dark_and_no_crack(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("training.photos.JOINTED", 1.0)
-    monkeypatch.setattr("training.photos.LENT", 0.0)
-    rgb, truth = np.full((300, 300, 3), 180, np.uint8), np.full((300, 300, 3), [0, 0, 255], np.uint8)
-    barely = np.nextafter(0.0, 1.0)  # the share of crops that get cracks
-    photo = Photo("bare", rgb, truth, np.full((300, 300), 255, np.uint8), NOWHERE, (1.0, 1.0), barely)
-    darkest = []
-    for seed in range(20):
-        looks, mask = crop(photo, photo, np.random.default_rng(seed))
-        assert mask[2].all() and not mask[:2].any()
-        grey = cv2.medianBlur((255 * looks.mean(axis=0)).astype(np.uint8), 3).astype(float)
-        darkest.append(grey.min() / np.median(grey))
-    assert np.median(darkest) < 0.8
-
-
 def _line() -> Photo:
     """A dark crack five pixels wide across a bright photo."""
     rgb = np.full((300, 300, 3), 180, np.uint8)
