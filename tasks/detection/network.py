@@ -23,7 +23,7 @@ SHA256 = "030662d23614c4284c81831a6cde29fa5bf7563f26b42823b31303741192718f"
 STRIDE = 32
 TILE_PX = 2048
 HALO_PX = 96  # of an octave: what lies further away changes a probability by 3/255 at most (measured)
-OCTAVES = (0.7, 0.3)  # at half size our network sees twice as far, and wide cracks whole
+HALF = 0.5  # what its answer at half size counts where a crack is wide enough to be seen at quarter size
 FILL_PX = 63  # what is not known is filled from this far around
 
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
@@ -32,7 +32,7 @@ Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
 class Model(NamedTuple):
     content: bytes  # ONNX
     name: str  # for messages
-    octaves: tuple[float, ...] = (1.0,)  # weights of its answers to the image at full size, half size, …
+    at_smaller_sizes: bool = False  # ask it again at half and quarter size, where it sees wide cracks whole
 
 
 def our_model() -> Model:
@@ -44,7 +44,7 @@ def our_model() -> Model:
         raise BadInput(OURS.name, f"cannot be read ({problem.strerror})", remedy) from None
     if hashlib.sha256(content).hexdigest() != SHA256:
         raise BadInput(OURS.name, "is not the network that this version ships: altered or cut short", remedy)
-    return Model(content, OURS.name, OCTAVES)
+    return Model(content, OURS.name, at_smaller_sizes=True)
 
 
 def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:
@@ -57,14 +57,20 @@ def probability(raster: Raster, model: Model, on_progress: Progress | None = Non
         bottom, right = min(height, y + TILE_PX), min(width, x + TILE_PX)
         valid = raster.valid(y, bottom, x, right)
         if valid.any():
-            logit = np.zeros(valid.shape, np.float32)
-            for octave, weight in enumerate(model.octaves):
-                logit += np.float32(weight) * _tile(net, raster, (y, bottom, x, right), octave, model)
-            p = 1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0)))
+            window = (y, bottom, x, right)
+            logit = _tile(net, raster, window, 0, model)
+            if model.at_smaller_sizes:
+                half, quarter = (_tile(net, raster, window, octave, model) for octave in (1, 2))
+                logit += np.float32(HALF) * _sigmoid(quarter) * (half - logit)
+            p = _sigmoid(logit)
             whole[y:bottom, x:right] = np.where(valid, np.rint(255.0 * p), 0)
         if on_progress is not None:
             on_progress(done / len(corners))
     return whole
+
+
+def _sigmoid(logit: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0))), np.float32)
 
 
 def _tile(

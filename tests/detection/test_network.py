@@ -27,6 +27,19 @@ def test_a_guest_network_says_what_it_was_made_to_say() -> None:
     assert (p[0, 0], p[25, 35]) == tuple(expected) and set(np.unique(p)) == set(expected.astype(int))
 
 
+def test_what_is_wide_is_seen_whole_at_smaller_sizes_and_what_is_thin_stays() -> None:
+    """A wide band, dark but for specks that are a little too bright for a crack, and a thin dark line."""
+    rgb = np.full((256, 256, 3), 200, np.uint8)
+    rgb[64:128] = 0
+    rgb[64:128:2, ::2] = 60
+    rgb[200:202] = 20
+    alone = probability(ArrayRaster(rgb), GUEST)
+    asked = probability(ArrayRaster(rgb), GUEST._replace(at_smaller_sizes=True))
+    specks = alone[80:112:2, 32:224:2], asked[80:112:2, 32:224:2]
+    assert specks[0].max() < 128 < specks[1].min()
+    assert (alone[200:202] > 250).all() and (asked[200:202] > 250).all() and (asked[220:] < 5).all()
+
+
 def test_a_guest_finds_the_crack_that_it_can_see() -> None:
     rgb = rough(200, 400, contrast=0.01)
     truth = with_crack(rgb, 100, 5, 0.9, 20, 380)
