@@ -3,7 +3,7 @@
 On photos of a fold that training left out, and on surfaces it never saw, this fits
 - slope and offset of the logits, so that of the photos' pixels called 70 % seven in ten are crack (Platt
   1999), for training.export; with the network so calibrated this is run once more;
-- the weights of a candidate's score (tasks.detection.candidates): its strength, length and bend against
+- the weights of a candidate's score (tasks.detection.candidates): its strength and bend against
   whether most of it lies on a crack that somebody drew;
 and counts false cracks on the surfaces without any, for each least score. Nothing else is fitted on anything.
 """

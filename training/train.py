@@ -94,7 +94,7 @@ def main() -> None:
     folds = by_fold(args.photos / "groups.txt")
     left_out = [] if args.fold is None else folds[args.fold]
     kept = [name for fold in folds for name in fold if name not in left_out]
-    photos = read(args.photos, kept, (0.6, 3.0), DRAWN)
+    photos = read(args.photos, kept, (0.5, 4.0), DRAWN)
     held = read(args.photos, left_out, (1.0, 1.0))
     surfaces = read(args.surfaces, sorted(p.name for p in (args.surfaces / "masks").iterdir()), (0.7, 2.0))
 

@@ -1,7 +1,7 @@
 """From probabilities to cracks: what hangs together is judged as a whole.
 
 A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). Its score is the
-probability that a candidate of its strength, length and straightness is a crack, fitted on photos and
+probability that a candidate of its strength and straightness is a crack, fitted on photos and
 surfaces that the network had not seen (training.calibrate): so one threshold stands for one rate of false
 alarms.
 """
@@ -14,10 +14,10 @@ import numpy.typing as npt
 from tasks.detection.components import Components, components
 from tasks.detection.network import Probability
 
-EDGE = 102  # of 255: a pixel belongs to a crack from here on; best on the fold not trained on
-SURE = 179  # and one of a crack's pixels reaches this
+EDGE = 77  # of 255: a pixel belongs to a crack from here on; best on the fold not trained on
+SURE = 115  # and one of a crack's pixels reaches this
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
-WEIGHTS = (0.742, 0.372, -1.249, -0.131, -3.386)  # of the features, from training.calibrate
+WEIGHTS = (1.843, -1.515, -0.454, -1.599)  # of the features, from training.calibrate
 
 Floats = npt.NDArray[np.float64]
 
@@ -50,18 +50,17 @@ def candidates(probability: Probability) -> Candidates:
 
 
 def features(found: Components, probability: Probability) -> Floats:
-    """(n, 5) by label: logit of the strength, ln of the length in pixels, the bend and its square, 1.
+    """(n, 4) by label: logit of the strength, the bend and its square, 1.
 
     The bend is ln(short / long) of the axes of inertia: a ruled line of 300 px has −5, a crack −3 to −1, a
     ring 0. Both ends are rarely cracks, hence the square."""
     p = np.clip(strength(found, probability), 1.0 - STRONGEST, STRONGEST)
     bend = _bend(found)
-    length = np.log(np.maximum(found.extent_px, 1.0))
-    return np.column_stack([np.log(p / (1.0 - p)), length, bend, bend**2, np.ones(len(p))])
+    return np.column_stack([np.log(p / (1.0 - p)), bend, bend**2, np.ones(len(p))])
 
 
 def score_of(of_candidates: Floats) -> Floats:
-    """(n,) logistic in the (n, 5) features."""
+    """(n,) logistic in the (n, 4) features."""
     return np.asarray(1.0 / (1.0 + np.exp(-(of_candidates @ np.asarray(WEIGHTS)))))
 
 
