@@ -68,7 +68,9 @@ def test_a_truncated_archive_gives_what_it_has(log: FlightLog, tmp_path: Path) -
     cut.write_bytes(whole[: int(len(whole) * 0.6)])
     part = import_log.bare(store.current().put(cut), "cut.mcap", PLAN)
     assert 0.4 * log.duration_s < part.duration_s < 0.75 * log.duration_s
-    assert part.shots == log.shots[: len(part.shots)]
+    *before, last = part.shots  # the speed at the last rests on less of the track
+    assert tuple(before) == log.shots[: len(before)]
+    assert last.pose == log.shots[len(before)].pose
     assert {s.photo for s in part.shots} | set(part.missed) == {s.photo for s in log.shots}
 
 
