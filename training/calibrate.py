@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.raster import ArrayRaster
-from tasks.detection.candidates import EDGE, STRONGEST, SURE, features
+from tasks.detection.candidates import STRONGEST, features
 from tasks.detection.components import ELONGATION, components
-from tasks.detection.network import Model, Probability, probability
+from tasks.detection.network import OUR_LIMITS, Model, Probability, probability
 from training.cracks import DOUBTFUL
 from training.photos import by_fold
 
@@ -80,8 +80,10 @@ def fit_pixels(pairs: list[tuple[Probability, Mask]]) -> Floats:
 
 def judged(p: Probability, truth: Mask, least_px: float) -> tuple[Floats, Mask]:
     """Features of the long and thin candidates, and which of them are cracks."""
-    found = components(p >= EDGE)
-    which = found.holding(p >= SURE) & (found.extent_px >= least_px) & (found.elongation >= ELONGATION)
+    found = components(p >= OUR_LIMITS.edge)
+    which = (
+        found.holding(p >= OUR_LIMITS.sure) & (found.extent_px >= least_px) & (found.elongation >= ELONGATION)
+    )
     which[0] = False
     reach = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEAR_PX + 1, 2 * NEAR_PX + 1))
     near = cv2.dilate(truth.astype(np.uint8), reach) > 0

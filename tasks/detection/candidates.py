@@ -12,10 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tasks.detection.components import Components, components
-from tasks.detection.network import Probability
+from tasks.detection.network import Limits, Probability
 
-EDGE = 77  # of 255: a pixel belongs to a crack from here on; best on the fold not trained on
-SURE = 115  # and one of a crack's pixels reaches this
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
 WEIGHTS = (1.843, -1.515, -0.454, -1.599)  # of the features, from training.calibrate
 
@@ -40,10 +38,10 @@ class Candidates(NamedTuple):
         return tuple(scored)
 
 
-def candidates(probability: Probability) -> Candidates:
-    """Connected pixels of at least EDGE that hold one of at least SURE, each with its score."""
-    found = components(probability >= EDGE)
-    sure = found.holding(probability >= SURE)
+def candidates(probability: Probability, limits: Limits) -> Candidates:
+    """Connected pixels of at least `edge` that hold one of at least `sure`, each with its score."""
+    found = components(probability >= limits.edge)
+    sure = found.holding(probability >= limits.sure)
     score = np.where(sure, score_of(features(found, probability)), 0.0)
     score[0] = 0.0
     return Candidates(found, score)

@@ -75,7 +75,7 @@ def _by_network(
     raster: Raster, model: Model, min_score: float, least_px: float, on_progress: Progress | None
 ) -> DetectionArrays:
     """What a network holds for cracks, long and likely enough as a whole, less what is straight."""
-    given = candidates(probability(raster, model, on_progress))
+    given = candidates(probability(raster, model, on_progress), model.limits)
     long = (given.found.extent_px >= least_px) & (given.found.elongation >= ELONGATION)
     likely = given.score >= min_score
     mask, joints = without_joints(given.found.keep(long & likely), JOINT_LENGTHS * least_px, least_px)

@@ -29,10 +29,22 @@ FILL_PX = 63  # what is not known is filled from this far around
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
 
 
+class Limits(NamedTuple):
+    """255 × the probability from which a pixel belongs to a crack, and which one pixel of a crack reaches."""
+
+    edge: int
+    sure: int
+
+
+OUR_LIMITS = Limits(77, 115)  # best on the fold not trained on
+USUAL_LIMITS = Limits(128, 179)  # of a guest: more likely crack than not; nobody fitted anything to it
+
+
 class Model(NamedTuple):
     content: bytes  # ONNX
     name: str  # for messages
     at_smaller_sizes: bool = False  # ask it again at half and quarter size, where it sees wide cracks whole
+    limits: Limits = USUAL_LIMITS
 
 
 def our_model() -> Model:
@@ -44,7 +56,7 @@ def our_model() -> Model:
         raise BadInput(OURS.name, f"cannot be read ({problem.strerror})", remedy) from None
     if hashlib.sha256(content).hexdigest() != SHA256:
         raise BadInput(OURS.name, "is not the network that this version ships: altered or cut short", remedy)
-    return Model(content, OURS.name, at_smaller_sizes=True)
+    return Model(content, OURS.name, at_smaller_sizes=True, limits=OUR_LIMITS)
 
 
 def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:

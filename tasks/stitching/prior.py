@@ -25,7 +25,9 @@ class Prior:
     view: View
     sigma_position: Array  # (3,) along u, v, w; inf: not known
     sigma_rotation: Array  # (3,) radians, about the camera's x, y (tilts) and z (view axis); inf: not known
-    velocity: Array = field(default_factory=lambda: UNKNOWN)  # (3,) units a second along u, v, w
+    velocity: Array = field(
+        default_factory=lambda: UNKNOWN
+    )  # (3,) units a second along u, v, w; NaN: not known
 
     @property
     def has_position(self) -> bool:

@@ -31,9 +31,7 @@ def rows(columns: int, rows_: int, cache: Path) -> Iterator[Row]:
     with TemporaryDirectory() as folder:
         _enlarge(photos, Path(folder))
         known_photos = (Path(folder), photos.poses, photos.position_sigma_m, photos.face.surface())
-        with get_context("spawn").Pool(
-            1
-        ) as alone:  # a process of its own: the simulator's memory is not asked
+        with get_context("spawn").Pool(1) as alone:  # the simulator's memory is not asked
             solved, canvas_px, cpu_s, gib = alone.apply(_stitched, known_photos)
     megapixels = canvas_px[0] * canvas_px[1] / 1e6
     data = f"{len(photos.poses)} × 12 MP, canvas {canvas_px[0]:,} × {canvas_px[1]:,} px"

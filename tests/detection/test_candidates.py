@@ -2,8 +2,11 @@ import cv2
 import numpy as np
 import pytest
 
-from tasks.detection.candidates import EDGE, SURE, candidates, features, strength
+from tasks.detection.candidates import candidates, features, strength
 from tasks.detection.components import components
+from tasks.detection.network import OUR_LIMITS, USUAL_LIMITS
+
+EDGE, SURE = OUR_LIMITS
 
 
 def line(levels: tuple[int, ...], length: int = 60) -> np.ndarray:
@@ -22,13 +25,18 @@ def test_strength_is_that_of_the_middle_and_not_of_the_rim() -> None:
 
 
 def test_a_candidate_needs_a_pixel_that_is_sure() -> None:
-    faint, sure = candidates(line((SURE - 1,))), candidates(line((SURE,)))
+    faint, sure = (candidates(line((level,)), OUR_LIMITS) for level in (SURE - 1, SURE))
     assert faint.score[1] == 0.0 < sure.score[1]
-    assert candidates(np.zeros((5, 5), np.uint8)).score.tolist() == [0.0]
+    assert candidates(np.zeros((5, 5), np.uint8), OUR_LIMITS).score.tolist() == [0.0]
+
+
+def test_what_is_likelier_no_crack_is_none_by_a_guest() -> None:
+    p = line((120, 120))
+    assert candidates(p, OUR_LIMITS).score.max() > 0.0 == candidates(p, USUAL_LIMITS).score.max()
 
 
 def test_stronger_is_likelier() -> None:
-    faint, strong = (candidates(line((level,))).score[1] for level in (150, 250))
+    faint, strong = (candidates(line((level,)), OUR_LIMITS).score[1] for level in (150, 250))
     assert 0.0 < faint < strong < 1.0
 
 
@@ -46,6 +54,6 @@ def test_bend_is_least_for_a_ruled_line_and_none_for_a_ring() -> None:
 
 
 def test_a_score_says_where() -> None:
-    given = candidates(line((250, 250)))
+    given = candidates(line((250, 250)), OUR_LIMITS)
     (one,) = given.at(given.score > 0)
     assert one.position_px == (50.0, 11.0) and one.score == round(float(given.score[1]), 3)
