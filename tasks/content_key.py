@@ -12,11 +12,13 @@ import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from pydantic_core import to_json
 
 ROOT = Path(__file__).parents[1]
+PARSING = Lock()  # CPython 3.11 counts the depth of a tree for all threads at once, and raises SystemError
 OURS = ("artifacts", "flows", "schemas", "tasks")
 # The mechanism of caching and what only shows results cannot change a result.
 WITHOUT_INFLUENCE = (
@@ -63,7 +65,9 @@ def _module(name: str) -> tuple[Mapping[str, str], tuple[str, ...]]:
     path = _source(name)
     if path is None:
         return {}, ()
-    tree = _without_docstrings(ast.parse(path.read_bytes()))
+    with PARSING:
+        tree = ast.parse(path.read_bytes())
+    tree = _without_docstrings(tree)
     digests = {path.relative_to(ROOT).as_posix(): _sha(ast.dump(tree).encode())}
     for data in _data_files(tree):
         file = path.parent / data

@@ -1,6 +1,11 @@
 """The key follows the code and the content, and nothing else."""
 
 import ast
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
 
 from schemas.problem import LeftOut
 from tasks import content_key
@@ -35,3 +40,22 @@ def test_inputs_are_digested_by_content() -> None:
     one = LeftOut(item="a", stage="s", what="w")
     assert digest_inputs({"x": (one,)}) == digest_inputs({"x": (one.model_copy(),)})
     assert digest_inputs({"x": one}) != digest_inputs({"x": one.model_copy(update={"what": "v"})})
+
+
+def test_threads_parse_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Together they raise SystemError now and then, in CPython 3.11."""
+    parse, inside, most = ast.parse, [], []
+
+    def watched(*given: Any) -> ast.Module:
+        inside.append(1)
+        most.append(len(inside))
+        time.sleep(0.01)
+        inside.pop()
+        return parse(*given)
+
+    monkeypatch.setattr(ast, "parse", watched)
+    content_key._module.cache_clear()
+    names = ["schemas.camera", "schemas.photo", "schemas.plane", "schemas.surface"]
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(content_key._module, names))
+    assert len(most) == 4 and max(most) == 1
