@@ -1,6 +1,7 @@
 """Multi-band blending (Burt & Adelson 1983): coarse bands mix over wide seams, fine ones over narrow."""
 
 import cv2
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -22,21 +23,38 @@ class MultiBand:
         """`layer` (h, w, 3), valid all over; `mask` (h, w), 1 where it is wanted; corner, size aligned."""
         for k in range(BANDS + 1):
             window = (slice(y >> k, (y >> k) + mask.shape[0]), slice(x >> k, (x >> k) + mask.shape[1]))
-            if k < BANDS:
-                lower: Layer = np.asarray(cv2.pyrDown(layer), np.float32)
-                band: Layer = layer - np.asarray(cv2.pyrUp(lower), np.float32)
-            else:
-                lower, band = layer, layer
-            self._sum[k][window] += band * mask[..., None]
-            self._weight[k][window] += mask
+            lower: Layer = np.asarray(cv2.pyrDown(layer), np.float32) if k < BANDS else layer
+            coarse = np.asarray(cv2.pyrUp(lower), np.float32) if k < BANDS else np.zeros_like(layer)
+            _accumulate(self._sum[k][window], self._weight[k][window], layer, coarse, mask)
             layer, mask = lower, np.asarray(cv2.pyrDown(mask), np.float32)
 
     def result(self) -> npt.NDArray[np.uint8]:
-        """(H, W, 3), 0 where no layer reaches."""
-        image = self._band(BANDS)
-        for k in range(BANDS - 1, -1, -1):
-            image = self._band(k) + np.asarray(cv2.pyrUp(image), np.float32)
-        return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+        """(H, W, 3), 0 where no layer reaches. To be asked once."""
+        image = np.zeros_like(self._sum[BANDS])
+        for k in range(BANDS, -1, -1):
+            coarse = image if k == BANDS else np.asarray(cv2.pyrUp(image), np.float32)
+            image = self._sum[k]
+            _collapse(image, self._weight[k], coarse)
+        return np.asarray(cv2.convertScaleAbs(cv2.max(image, 0.0)), np.uint8)
 
-    def _band(self, k: int) -> Layer:
-        return np.asarray(self._sum[k] / np.maximum(self._weight[k], 1e-4)[..., None], np.float32)
+
+@numba.njit(cache=True, nogil=True)
+def _accumulate(total: Layer, weight: Layer, layer: Layer, coarse: Layer, mask: Layer) -> None:
+    """total += (layer − coarse) · mask, weight += mask."""
+    for y in range(mask.shape[0]):
+        for x in range(mask.shape[1]):
+            share = mask[y, x]
+            if share > 0.0:
+                weight[y, x] += share
+                for c in range(3):
+                    total[y, x, c] += (layer[y, x, c] - coarse[y, x, c]) * share
+
+
+@numba.njit(cache=True, nogil=True)
+def _collapse(total: Layer, weight: Layer, coarse: Layer) -> None:
+    """total = total / weight + coarse, in place."""
+    for y in range(weight.shape[0]):
+        for x in range(weight.shape[1]):
+            share = np.float32(1.0) / max(weight[y, x], np.float32(1e-4))
+            for c in range(3):
+                total[y, x, c] = total[y, x, c] * share + coarse[y, x, c]

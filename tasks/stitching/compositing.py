@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tasks.stitching.blending import ALIGN, REACH, MultiBand
 from tasks.stitching.canvas import Canvas
-from tasks.stitching.gain import Light, gain_table, unvignetted
+from tasks.stitching.gain import Light, gain_table, relit
 from tasks.stitching.seams import Partition, label_window, partition, photo_map
 from tasks.stitching.view import View, shrunk
 
@@ -65,7 +65,7 @@ def composite(
     parted = partition(views, worth, canvas, dark)
     shrink = [max(1, int(canvas.gsd / v.units_per_px + 0.25)) for v in views]
     used = [shrunk(v, s) for v, s in zip(views, shrink, strict=True)]
-    tables = [np.stack([gain_table(float(g)) for g in gains], axis=1)[None] for gains in light.gains]
+    tables = [np.stack([gain_table(float(g)) for g in gains], axis=1) for gains in light.gains]
 
     def read_used(index: int) -> Pixels:
         pixels, camera = read(index), used[index].camera
@@ -110,7 +110,7 @@ def _tile(
     ww, wh = TILE_PX + 2 * REACH, TILE_PX + 2 * REACH
     label = label_window(views, worth, canvas, parted, wx, wy, ww, wh)
     blend = MultiBand(ww, wh)
-    for i in np.unique(label[label >= 0]):
+    for i in np.flatnonzero(np.bincount(label.ravel() + 1)[1:]):  # photos in sight
         mine = label == i
         x0, x1 = _extent(mine.any(axis=0), ww)
         y0, y1 = _extent(mine.any(axis=1), wh)
@@ -118,9 +118,7 @@ def _tile(
         warped = cv2.remap(
             read(int(i)), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
-        layer = unvignetted(
-            np.asarray(cv2.LUT(warped, tables[i]), np.float32), at, views[i], light.falloff[i]
-        )
+        layer = relit(np.asarray(warped, np.uint8), at, views[i], tables[i], light.falloff[i])
         blend.add(layer, mine[y0:y1, x0:x1].astype(np.float32), x0, y0)
     inner = (slice(REACH, REACH + height), slice(REACH, REACH + width))
     own = label[inner]

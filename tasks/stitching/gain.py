@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
+import numba
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
@@ -55,15 +56,30 @@ def gain_table(gain: float) -> npt.NDArray[np.float32]:
     return (255.0 * srgb).astype(np.float32)
 
 
-def unvignetted(layer: Floats, at: Floats, view: View, falloff: Array) -> Floats:
-    """(h, w, 3) sRGB levels of photo pixels `at` (h, w, 2), the lens's falloff undone.
+def relit(pixels: Pixels, at: Floats, view: View, table: Floats, falloff: Array) -> Floats:
+    """(h, w, 3) sRGB levels of `pixels`, seen at photo pixels `at` (h, w, 2): by `table` (256, 3), as
+    gain_table gives it for each colour, then without the lens's falloff.
 
     A factor on linear light is one on the sRGB level + 14.025, but for the darkest ten levels."""
-    if not falloff.any():
-        return layer
-    rho2 = _rho2(at, view)[..., None]
-    factor = np.exp(rho2 * (falloff[0] + rho2 * falloff[1]) / 2.4).astype(np.float32)
-    return np.asarray((layer + np.float32(14.025)) * factor - np.float32(14.025))
+    w, h = view.camera.width_px, view.camera.height_px
+    cx, cy = view.camera.principal_px
+    lens = np.array([cx, cy, 4.0 / (w * w + h * h), falloff[0] / 2.4, falloff[1] / 2.4], np.float32)
+    return np.asarray(_relit(pixels, at, table, lens), np.float32)
+
+
+@numba.njit(cache=True, nogil=True)
+def _relit(pixels: Pixels, at: Floats, table: Floats, lens: Floats) -> Floats:
+    """lens: the axis's pixel, 1 / half diagonal², and the terms of the log of the factor."""
+    levels = np.empty(pixels.shape, np.float32)
+    lift, rim = np.float32(14.025), np.float32(RIM)
+    for y in range(pixels.shape[0]):
+        for x in range(pixels.shape[1]):
+            dx, dy = at[y, x, 0] - lens[0], at[y, x, 1] - lens[1]
+            rho2 = min((dx * dx + dy * dy) * lens[2], rim)
+            factor = np.exp(rho2 * (lens[3] + rho2 * lens[4]))
+            for c in range(3):
+                levels[y, x, c] = (table[pixels[y, x, c], c] + lift) * factor - lift
+    return levels
 
 
 def _rho2(at: npt.NDArray[np.floating], view: View) -> npt.NDArray[np.floating]:

@@ -70,8 +70,8 @@ def darkness(pixels: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
     it: of a line, its depth, whatever the light."""
     grey = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
     height, width = grey.shape[0] // DARK_PX, grey.shape[1] // DARK_PX
-    squares = grey[: height * DARK_PX, : width * DARK_PX].reshape(height, DARK_PX, width, DARK_PX)
-    lowest = squares.min(axis=(1, 3)).astype(np.float32)
+    rows = grey[: height * DARK_PX].reshape(height, DARK_PX, -1).min(axis=1)  # along memory: the quick way
+    lowest = rows[:, : width * DARK_PX].reshape(height, width, DARK_PX).min(axis=2).astype(np.float32)
     size = (width, height)
     mean = cv2.resize(grey[: height * DARK_PX, : width * DARK_PX], size, interpolation=cv2.INTER_AREA)
     return np.asarray((mean - lowest) / np.maximum(mean, np.float32(1.0)), np.float32)

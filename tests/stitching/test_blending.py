@@ -5,7 +5,7 @@ import pytest
 
 from schemas.camera import Camera
 from tasks.stitching.blending import MultiBand
-from tasks.stitching.gain import Light, gain_table, solve_light, srgb_to_linear, unvignetted
+from tasks.stitching.gain import Light, gain_table, relit, solve_light, srgb_to_linear
 from tasks.stitching.view import FACING, View
 
 
@@ -78,7 +78,8 @@ def test_exposure_and_falloff_are_told_apart() -> None:
     evened = light.gains[:, 1] * SET
     assert np.abs(evened / evened.mean() - 1).max() < 0.005
     at = np.stack(np.meshgrid(np.arange(480.0), np.arange(360.0)), axis=-1).astype(np.float32)
-    flat = unvignetted(photos[2].astype(np.float32), at, views[2], light.falloff[2])
+    as_it_is = np.stack([np.arange(256, dtype=np.float32)] * 3, axis=1)
+    flat = relit(photos[2], at, views[2], as_it_is, light.falloff[2])
     middle, corner = flat[170:190, 230:250].mean(), flat[:20, :20].mean()
     assert corner == pytest.approx(middle, rel=0.02)
     assert photos[2][:20, :20].mean() < 0.9 * middle
