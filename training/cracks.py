@@ -11,6 +11,8 @@ SUPERSAMPLED = 8  # of the truth, along each axis
 VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
 SMOOTH = 0.5  # share of cracks without roughness
 DOUBTFUL = 128  # in a truth: no answer is wrong here
+LEAST_DARK = 1.5  # RMS of the surface around, that a stretch of crack is darker by where one can tell it
+STRETCH_PX = 31  # that darkness is averaged over along a crack; the surface is looked at as far to each side
 
 Array = npt.NDArray[np.float64]
 Rng = np.random.Generator
@@ -34,6 +36,24 @@ def seen(cracks: Cracks, side_px: int, side_m: float, px_m: float) -> npt.NDArra
             cv2.fillConvexPoly(fine, quad, 255, shift=4)
     share = cv2.resize(fine, (side_px, side_px), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
     return np.asarray(cv2.GaussianBlur(share, (0, 0), 0.7), np.float32)
+
+
+def told(rgb: npt.NDArray[np.float32], truth: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """(H, W) truth, DOUBTFUL where a crack cannot be told from the texture around it: nobody should learn
+    to see what is not there. rgb: (H, W, 3) in 0..1; truth: (H, W), 255 on cracks."""
+    grey = np.log(rgb.mean(axis=2) + np.float32(0.02))
+    crack = (truth == 255).astype(np.float32)
+    free = 1.0 - cv2.dilate((truth > 0).astype(np.float32), np.ones((7, 7)))
+    fine = cv2.GaussianBlur(grey, (0, 0), 1.0)
+
+    def mean(of: npt.NDArray[np.float32], over: npt.NDArray[np.float32], size_px: int) -> Array:
+        size = (size_px, size_px)
+        return np.asarray(cv2.boxFilter(of * over, -1, size) / np.maximum(cv2.boxFilter(over, -1, size), 1e-6))
+
+    around = mean(grey, free, 2 * STRETCH_PX + 1)
+    rms = np.sqrt(mean((fine - around) ** 2, free, 2 * STRETCH_PX + 1))
+    dark = mean(around - fine, crack, STRETCH_PX)
+    return np.where((crack > 0) & (dark < LEAST_DARK * rms + 0.01), np.uint8(DOUBTFUL), truth)
 
 
 def cracks_on(rng: Rng, side_m: float, px_m: float) -> Cracks:

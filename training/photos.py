@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from skimage.morphology import skeletonize
 
-from training.cracks import DOUBTFUL, VISIBLE, cracks_on, seen
+from training.cracks import DOUBTFUL, VISIBLE, cracks_on, seen, told
 
 SIDE_PX = 224
 ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
@@ -133,9 +133,12 @@ def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:
     """Further cracks across the crop, each lot as dark as one crack."""
     share = seen(cracks_on(rng, SIDE_PX, 1.0), SIDE_PX, SIDE_PX, 1.0)
     kept = np.exp(rng.uniform(np.log(0.12), np.log(0.88)))
-    crack = (share >= VISIBLE).astype(np.uint8)
+    cracked = rgb * (1.0 - share * np.float32(1.0 - kept))[..., None]
+    drawn = told(cracked, 255 * (share >= VISIBLE).astype(np.uint8))
+    crack = (drawn == 255).astype(np.uint8)
     both = np.maximum(truth, np.dstack([crack, _line(crack), crack]))
-    return rgb * (1.0 - share * np.float32(1.0 - kept))[..., None], both
+    both[..., 2] *= (drawn != DOUBTFUL) | (truth[..., 0] > 0)
+    return cracked, both
 
 
 def _warped(picture: Pixels, A: npt.NDArray[np.float64]) -> Pixels:

@@ -22,7 +22,7 @@ from tasks.simulation.light import LightMap
 from tasks.simulation.marks import Shapes, discs, in_cells, line, painted_box, painted_disc, segments
 from tasks.simulation.sensor import automatic_gain, develop
 from tasks.simulation.skin import Floats, Rgb, Skin, blotch, fine_grain, streak
-from training.cracks import DOUBTFUL, VISIBLE, Cracks, cracks_on, one_crack, ragged_joint, seen, walk
+from training.cracks import DOUBTFUL, VISIBLE, Cracks, cracks_on, one_crack, ragged_joint, seen, told, walk
 
 SIDE_PX = 640
 FOCAL_PX = 4000.0
@@ -53,7 +53,8 @@ def surface(seed: int, crack_free: bool = False) -> tuple[npt.NDArray[np.uint8],
     rgb = develop(gathered, camera, automatic_gain(gathered) * float(np.exp(rng.normal(0.1, 0.3))), rng)
     truth = np.where(seen(wires, SIDE_PX, side_m, px_m) > 0.02, DOUBTFUL, 0)
     truth[seen(cracks, SIDE_PX, side_m, px_m) >= VISIBLE] = 255
-    return _compressed(rgb, int(rng.integers(70, 96))), truth.astype(np.uint8)
+    seen_rgb = _compressed(rgb, int(rng.integers(70, 96)))
+    return seen_rgb, told(seen_rgb.astype(np.float32) / 255, truth.astype(np.uint8))
 
 
 def _compressed(rgb: npt.NDArray[np.uint8], quality: int) -> npt.NDArray[np.uint8]:

@@ -22,7 +22,7 @@ Pixels = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
 
 SHRINK = 8  # photos are averaged over squares of so many pixels before they are compared
-SAMPLES = 24  # a side of the grid laid over each photo
+SAMPLES = 36  # a side of the grid laid over each photo
 SIGMA_GAIN = 1.0  # 1σ of a photo's log exposure; binds only what overlaps nothing
 SIGMA_METERED = 0.05  # and of what it differs from what the camera says it set
 SIGMA_PAIR = 0.02  # of the log ratio of two photos, all samples alike: surfaces shine, air scatters
