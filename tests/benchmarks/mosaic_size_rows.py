@@ -1,5 +1,6 @@
 """Rows of `make bench-stitching ARGS="--large COLUMNS ROWS"`: memory of hundreds of photos of 12 MP. They are
-simulated at 2 MP and enlarged, with fresh noise: what they look like is not asked here."""
+simulated at 2 MP and enlarged, with fresh noise: what they look like is not asked here. With --gsd the mosaic
+is as fine as that, in mm a pixel: `--large 38 16 --gsd 0.255` writes 100,000 × 40,000 px."""
 
 import resource
 import time
@@ -25,12 +26,13 @@ SIZE_PX = (4000, 3000)
 NOISE = 3.0  # grey levels: detail of the enlarged photos' own
 
 
-def rows(columns: int, rows_: int, cache: Path) -> Iterator[Row]:
+def rows(columns: int, rows_: int, cache: Path, gsd_mm_px: float | None) -> Iterator[Row]:
     (plane,) = (case for case in CASES if case.name == "plane")
     photos = wall_photos(plane, columns, rows_, 2.0, 1, cache)
     with TemporaryDirectory() as folder:
         _enlarge(photos, Path(folder))
-        known_photos = (Path(folder), photos.poses, photos.position_sigma_m, photos.face.surface())
+        surface = photos.face.surface()
+        known_photos = (Path(folder), photos.poses, photos.position_sigma_m, surface, gsd_mm_px)
         with get_context("spawn").Pool(1) as alone:  # the simulator's memory is not asked
             solved, canvas_px, cpu_s, gib = alone.apply(_stitched, known_photos)
     megapixels = canvas_px[0] * canvas_px[1] / 1e6
@@ -54,7 +56,7 @@ def _enlarge(photos: WallPhotos, folder: Path) -> None:
 
 
 def _stitched(
-    folder: Path, poses: dict[str, CameraPose], sigma_m: float, surface: Surface
+    folder: Path, poses: dict[str, CameraPose], sigma_m: float, surface: Surface, gsd_mm_px: float | None
 ) -> tuple[int, tuple[int, int], float, float]:
     """Photos solved, size of the canvas, CPU seconds and the largest memory in GiB of this process."""
     began = time.process_time()
@@ -64,7 +66,7 @@ def _stitched(
             ingest.bare(store.current().put(folder / name), name, "wall", camera, pose, sigma_m)
             for name, pose in sorted(poses.items())
         )
-        settings = StitchSettings()
+        settings = StitchSettings(gsd_mm_px=gsd_mm_px)
         described = tuple(features.bare(photo, settings) for photo in taken)
         mosaic = stitch.bare("wall", surface, taken, described, settings)
     solved = sum(placement.status == "solved" for placement in mosaic.placements)

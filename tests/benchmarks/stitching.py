@@ -254,6 +254,7 @@ def main() -> None:
     asked.add_argument(
         "--large", type=int, nargs=2, metavar=("COLUMNS", "ROWS"), help="memory at 12 MP a photo"
     )
+    asked.add_argument("--gsd", type=float, help="of the mosaic of --large, mm a pixel")
     asked.add_argument("--beach", action="store_true", help="the real photos, at full size")
     asked.add_argument("--megapixels", type=float, default=2.0)
     given = asked.parse_args()
@@ -266,7 +267,7 @@ def main() -> None:
         for line in table:
             _tell(line)
     if given.large:
-        for line in mosaic_size_rows.rows(*given.large, given.cache):
+        for line in mosaic_size_rows.rows(*given.large, given.cache, given.gsd):
             table.append(line)
             _tell(line)
     if given.beach:
