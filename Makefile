@@ -4,7 +4,7 @@ BIN := .venv/bin
 SYSTEM_LIBRARIES := libegl1 libgl1 libgomp1 libusb-1.0-0
 BENCHES := detection planning scans stitching
 
-.PHONY: demo test check bench $(addprefix bench-,$(BENCHES)) train-detector lock clean
+.PHONY: demo test check bench $(addprefix bench-,$(BENCHES)) train-detector train-folds lock clean
 
 demo: .venv/.ready
 	$(BIN)/hairline demo --out runs/demo
@@ -29,6 +29,16 @@ train-detector: .venv/.ready  # two hours on two cores; PHOTOS=FOLDER holds imag
 	$(BIN)/python -m training.surfaces build/training/surfaces 900
 	$(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/run --fold 0
 	$(BIN)/python -m training.export build/training/run/weights.pt build/training/hairline.onnx
+
+train-folds: .venv/.ready  # half an hour each: a network for each fold but the shipped one's, for bench-detection
+	@[ -n "$(PHOTOS)" ] || { echo "Name the photos: make train-folds PHOTOS=FOLDER"; exit 1; }
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[train]'
+	$(BIN)/python -m training.surfaces build/training/surfaces 900
+	mkdir -p build/training/folds
+	for k in 1 2 3 4; do \
+	  $(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/fold$$k --fold $$k --steps 8000 \
+	  && $(BIN)/python -m training.export build/training/fold$$k/weights.pt build/training/folds/$$k.onnx 1 -1.5 \
+	  || exit 1; done
 
 .venv/.ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \

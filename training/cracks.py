@@ -48,7 +48,9 @@ def told(rgb: npt.NDArray[np.float32], truth: npt.NDArray[np.uint8]) -> npt.NDAr
 
     def mean(of: npt.NDArray[np.float32], over: npt.NDArray[np.float32], size_px: int) -> Array:
         size = (size_px, size_px)
-        return np.asarray(cv2.boxFilter(of * over, -1, size) / np.maximum(cv2.boxFilter(over, -1, size), 1e-6))
+        return np.asarray(
+            cv2.boxFilter(of * over, -1, size) / np.maximum(cv2.boxFilter(over, -1, size), 1e-6)
+        )
 
     around = mean(grey, free, 2 * STRETCH_PX + 1)
     rms = np.sqrt(mean((fine - around) ** 2, free, 2 * STRETCH_PX + 1))

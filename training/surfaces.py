@@ -53,8 +53,8 @@ def surface(seed: int, crack_free: bool = False) -> tuple[npt.NDArray[np.uint8],
     rgb = develop(gathered, camera, automatic_gain(gathered) * float(np.exp(rng.normal(0.1, 0.3))), rng)
     truth = np.where(seen(wires, SIDE_PX, side_m, px_m) > 0.02, DOUBTFUL, 0)
     truth[seen(cracks, SIDE_PX, side_m, px_m) >= VISIBLE] = 255
-    seen_rgb = _compressed(rgb, int(rng.integers(70, 96)))
-    return seen_rgb, told(seen_rgb.astype(np.float32) / 255, truth.astype(np.uint8))
+    photo = _compressed(rgb, int(rng.integers(70, 96)))
+    return photo, told(photo.astype(np.float32) / np.float32(255), truth.astype(np.uint8))
 
 
 def _compressed(rgb: npt.NDArray[np.uint8], quality: int) -> npt.NDArray[np.uint8]:

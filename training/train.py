@@ -24,7 +24,7 @@ from training.photos import DRAWN, Photo, by_fold, crop, read
 
 BATCH = 6  # two of three are photos, the others surfaces
 RATE, WARM_UP, DECAY = 3e-3, 300, 1e-3
-AVERAGED = 0.9995  # weights are averaged over about 1 / (1 − AVERAGED) steps: these are judged and kept
+AVERAGED = 0.999  # weights are averaged over about 1 / (1 − AVERAGED) steps: these are judged and kept
 EVERY = 1000  # steps between checkpoints
 
 
@@ -109,7 +109,7 @@ def main() -> None:
         for step in range(1, args.steps + 1):
             rgb, truth = coming.result()
             coming = ahead.submit(batch, photos, surfaces, (args.seed << 32) + step)
-            rate = args.rate * min(step / WARM_UP, 1.0)
+            rate = args.rate * min(step / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / args.steps))
             for group in optimiser.param_groups:
                 group["lr"] = rate
             loss = loss_of(net(rgb.contiguous(memory_format=torch.channels_last)), truth)

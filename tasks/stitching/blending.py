@@ -35,7 +35,7 @@ class MultiBand:
             coarse = image if k == BANDS else np.asarray(cv2.pyrUp(image), np.float32)
             image = self._sum[k]
             _collapse(image, self._weight[k], coarse)
-        return np.asarray(cv2.convertScaleAbs(cv2.max(image, 0.0)), np.uint8)
+        return np.asarray(cv2.convertScaleAbs(np.maximum(image, np.float32(0.0))), np.uint8)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -110,14 +110,12 @@ def _tile(
     ww, wh = TILE_PX + 2 * REACH, TILE_PX + 2 * REACH
     label = label_window(views, worth, canvas, parted, wx, wy, ww, wh)
     blend = MultiBand(ww, wh)
-    for i in np.flatnonzero(np.bincount(label.ravel() + 1)[1:]):  # photos in sight
+    for i in map(int, np.flatnonzero(np.bincount(label.ravel() + 1)[1:])):  # photos in sight
         mine = label == i
         x0, x1 = _extent(mine.any(axis=0), ww)
         y0, y1 = _extent(mine.any(axis=1), wh)
         at = photo_map(views[i], canvas, wx + x0, wy + y0, x1 - x0, y1 - y0)
-        warped = cv2.remap(
-            read(int(i)), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
-        )
+        warped = cv2.remap(read(i), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         layer = relit(np.asarray(warped, np.uint8), at, views[i], tables[i], light.falloff[i])
         blend.add(layer, mine[y0:y1, x0:x1].astype(np.float32), x0, y0)
     inner = (slice(REACH, REACH + height), slice(REACH, REACH + width))

@@ -2,12 +2,15 @@
 doxapy, scikit-image and OpenCV. Both sets are real; their scale is unknown, 0.5 mm a pixel is assumed.
 
 Of `uav` the fold that the shipped network never saw is a row of its own; on the other folds it has learned.
+Part folds asks of each fold a network that never saw it, from `make train-folds PHOTOS=FOLDER`
+(of fold 0 the shipped one).
 What is not on this machine, a set or a peer, is a row that says so.
 """
 
 import importlib.util
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -20,11 +23,12 @@ from schemas.settings import DetectSettings
 from tasks.assessment.evaluation import evaluate, near
 from tasks.detection.components import components
 from tasks.detection.detect import detect_image
+from tasks.detection.network import OUR_LIMITS, Model, our_model
 from tasks.detection.sauvola import grey_of, sauvola
 from tests.benchmarks import wall_rows
 from tests.benchmarks.table import Row, absent, gather, row
 from tests.development_data import ROOT
-from training.photos import by_fold
+from training.photos import FOLDS, by_fold
 from training.surfaces import surface
 
 SETS = ("uav", "uav, fold 0", "deepcrack_train")
@@ -38,6 +42,7 @@ GSD_MM_PX = 0.5
 SURFACES, FIRST_SEED = 100, 960_000  # crack-free, unseen by training and calibration
 FALSE_PER_10_M2 = 1.0
 NEAR_PX = 5  # of a drawn crack: not a crack-free part
+FOLD_NETWORKS = Path("build/training/folds")  # K.onnx
 SPEED_BARS = {"Sauvola": 0.6, "ridge": 18.0, "hairline": 25.0}  # × doxapy's Sauvola
 SPEED_MP = 4.0
 
@@ -142,6 +147,39 @@ def _of_set(name: str) -> Iterator[tuple[Pixels, Mask]]:
             yield np.ascontiguousarray(bgr[..., ::-1]), truth
 
 
+def folds() -> Iterator[Row]:
+    """F1 of `hairline` on every photo of uav, each by a network that never saw its group; the worst fold."""
+    networks = {k: FOLD_NETWORKS / f"{k}.onnx" for k in range(1, FOLDS)}
+    missing = [str(path) for path in networks.values() if not path.is_file()]
+    if missing or not (ROOT / "cracks" / "uav").is_dir():
+        what = f"no {missing[0]}: make train-folds" if missing else "cracks/uav is not on this machine"
+        yield absent("F1 of hairline on uav, five folds", "", what)
+        return
+    of_fold = {0: our_model()} | {
+        k: Model(path.read_bytes(), path.name, at_smaller_sizes=True, limits=OUR_LIMITS)
+        for k, path in networks.items()
+    }
+    found = {
+        k: [
+            (detect_image(rgb, None, DetectSettings(), None, model=model).mask, truth)
+            for rgb, truth in _of_set(f"uav, fold {k}")
+        ]
+        for k, model in of_fold.items()
+    }
+    every = evaluate("hairline", [pair for pairs in found.values() for pair in pairs])
+    of_each = {k: evaluate("hairline", pairs) for k, pairs in found.items()}
+    for at, one in enumerate(every):
+        d = one.tolerance_px
+        bar = {0: "≥ 0.65", 2: "≥ 0.8"}.get(d)
+        low, high = one.f1_interval
+        what = f"F1 of hairline at {d} px, 95 % in {low:.2f}–{high:.2f}"
+        yield row(what, one.aggregate.f1, "1", bar, "uav, five folds", None)
+        worst = min(of_each, key=lambda k: of_each[k][at].aggregate.f1)
+        for k, those in of_each.items():
+            told = f"F1 of hairline at {d} px" + (", the worst fold" if k == worst else "")
+            yield row(told, those[at].aggregate.f1, "1", None, f"uav, fold {k}", None)
+
+
 def false_cracks() -> Iterator[Row]:
     """Found where the simulator drew none: cast, rough, smooth, wood, brick, and all that lies on them; of
     the network for each least score."""
@@ -215,6 +253,7 @@ def speed() -> Iterator[Row]:
 
 PARTS = {
     "photos": photos,
+    "folds": folds,
     "false-cracks": false_cracks,
     "false-on-photos": false_on_photos,
     "speed": speed,

@@ -11,7 +11,7 @@ import pytest
 from tasks.simulation.crack import CrackShape
 from tests.development_data import development_data
 from training import surfaces
-from training.cracks import DOUBTFUL, seen
+from training.cracks import DOUBTFUL, seen, told
 from training.photos import ON_CRACK, SIDE_PX, Photo, by_fold, crop, read
 from training.surfaces import main, surface
 
@@ -62,6 +62,22 @@ def test_a_crack_drawn_on_a_photo_is_dark_and_true() -> None:
         assert mask[2].all() and mask[0].any()
         contrast.append(looks[:, mask[0] == 0].mean() - looks[:, mask[1] > 0].mean())
     assert np.median(contrast) > 0.1
+
+
+def test_what_drowns_in_the_texture_is_neither_crack_nor_none() -> None:
+    """The same dark line on a smooth and on a rough wall, and one that only half of the wall drowns."""
+    rng = np.random.default_rng(0)
+    truth = np.zeros((200, 200), np.uint8)
+    truth[99:102] = 255
+    line = np.where(truth > 0, 0.8, 1.0)[..., None]
+    smooth, rough = (np.exp(rng.normal(0.0, sigma, (200, 200, 1))) * np.full(3, 0.4) for sigma in (0.02, 1.0))
+    half = np.where(np.arange(200)[None, :, None] < 100, smooth, rough)
+    on_smooth, on_rough, on_half = (
+        told(np.clip(wall * line, 0, 1).astype(np.float32), truth) for wall in (smooth, rough, half)
+    )
+    assert (on_smooth == truth).all()
+    assert (on_rough[99:102] == DOUBTFUL).mean() > 0.9 and not on_rough[truth == 0].any()
+    assert (on_half[99:102, :60] == 255).all() and (on_half[99:102, 140:] == DOUBTFUL).mean() > 0.9
 
 
 def test_groups_of_one_photo_never_part(tmp_path: Path) -> None:
