@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
@@ -27,6 +28,7 @@ HALF = 0.5  # what its answer at half size counts where a crack is wide enough t
 FILL_PX = 63  # what is not known is filled from this far around
 
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
+Logits = npt.NDArray[np.float32]  # (H, W)
 
 
 class Limits(NamedTuple):
@@ -72,22 +74,37 @@ def probability(raster: Raster, model: Model, on_progress: Progress | None = Non
             window = (y, bottom, x, right)
             logit = _tile(nets[0], raster, window, 0, model)
             if model.at_smaller_sizes:
-                half, quarter = (_tile(nets[octave], raster, window, octave, model) for octave in (1, 2))
-                logit += np.float32(HALF) * _sigmoid(quarter) * (half - logit)
-            p = _sigmoid(logit)
-            whole[y:bottom, x:right] = np.where(valid, np.rint(255.0 * p), 0)
+                _heed(logit, *(_tile(nets[octave], raster, window, octave, model) for octave in (1, 2)))
+            _fill(whole[y:bottom, x:right], logit, valid)
         if on_progress is not None:
             on_progress(done / len(corners))
     return whole
 
 
-def _sigmoid(logit: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0))), np.float32)
+@njit(cache=True, nogil=True)
+def _sigmoid(logit: np.float32) -> np.float32:
+    one, most = np.float32(1.0), np.float32(30.0)
+    return np.float32(one / (one + np.exp(-min(max(logit, -most), most))))
 
 
-def _tile(
-    net: Any, raster: Raster, window: tuple[int, int, int, int], octave: int, model: Model
-) -> npt.NDArray[np.float32]:
+@njit(cache=True, nogil=True)
+def _heed(logit: Logits, half: Logits, quarter: Logits) -> None:
+    """In place: what the network answers at half size, as far as it sees a crack at quarter size."""
+    for y in range(logit.shape[0]):
+        for x in range(logit.shape[1]):
+            share = np.float32(HALF) * _sigmoid(quarter[y, x])
+            logit[y, x] += share * (half[y, x] - logit[y, x])
+
+
+@njit(cache=True, nogil=True)
+def _fill(whole: Probability, logit: Logits, valid: Mask) -> None:
+    for y in range(logit.shape[0]):
+        for x in range(logit.shape[1]):
+            p = np.rint(np.float32(255.0) * _sigmoid(logit[y, x]))
+            whole[y, x] = np.uint8(p) if valid[y, x] else np.uint8(0)
+
+
+def _tile(net: Any, raster: Raster, window: tuple[int, int, int, int], octave: int, model: Model) -> Logits:
     """Logits of a window (rows, then columns), seen with its halo at 1 / 2^octave of its size."""
     halo_px = HALO_PX << octave
     top, left = max(0, window[0] - halo_px), max(0, window[2] - halo_px)
@@ -117,7 +134,7 @@ def _read(model: Model) -> Any:
         raise _unfit(model, f"cannot be read as an ONNX network ({_first_words(problem)})") from None
 
 
-def _logits(net: Any, rgb: Pixels, octave: int, model: Model) -> npt.NDArray[np.float32]:
+def _logits(net: Any, rgb: Pixels, octave: int, model: Model) -> Logits:
     """(H, W) of (H, W, 3), made 2^octave times smaller for the network and its answer as much larger."""
     height, width = rgb.shape[:2]
     step = STRIDE << octave
