@@ -207,6 +207,7 @@ class Stage(Generic[P, R]):
             result = self.bare(*args, **kwargs)
             if context is not None:
                 self._seconds[context.task_run.id] = time.monotonic() - began_s
+                _Progress.done(context)
             return result
 
         body.__name__, body.__module__, body.__doc__ = self.name, self.module, self.__doc__
@@ -285,11 +286,11 @@ def progress(fraction: float) -> None:
 class _Progress:
     """A stage's progress artifact, made at its first word and updated at most every two seconds."""
 
-    _of: dict[Any, "_Progress"] = {}  # noqa: RUF012  # one a task run, for the life of the process
+    _of: dict[Any, "_Progress"] = {}  # noqa: RUF012  # one a task run, until it is done
 
     def __init__(self, name: str) -> None:
         self.artifact: Any = create_progress_artifact(progress=0.0, key=f"progress-{name}")
-        self.last_s = time.monotonic()
+        self.last_s, self.shown = time.monotonic(), 0.0
 
     @classmethod
     def of(cls, context: TaskRunContext) -> "_Progress":
@@ -297,10 +298,17 @@ class _Progress:
             cls._of[context.task_run.id] = cls(context.task.name)
         return cls._of[context.task_run.id]
 
+    @classmethod
+    def done(cls, context: TaskRunContext) -> None:
+        """Not every stage says when it has come to its end: a flight ends between two waypoints."""
+        shown = cls._of.pop(context.task_run.id, None)
+        if shown is not None and shown.shown < 1.0:
+            shown.show(1.0)
+
     def show(self, fraction: float) -> None:
         now = time.monotonic()
         if now - self.last_s > 2.0 or fraction >= 1.0:
-            self.last_s = now
+            self.last_s, self.shown = now, fraction
             update_progress_artifact(self.artifact, progress=100.0 * min(fraction, 1.0))
 
 

@@ -129,6 +129,19 @@ def test_progress_is_told_to_the_listener() -> None:
     assert [(e.item, e.fraction) for e in events if e.outcome == "progress"] == [("progress", 0.5)]
 
 
+def test_the_dashboard_shows_a_stage_that_is_done_as_done() -> None:
+    """Though its last word was "half"."""
+
+    def shown() -> dict[Any, Any]:
+        with get_client(sync_client=True) as client:
+            named = ArtifactFilter(key=ArtifactFilterKey(any_=["progress-shout"]))
+            return {one.id: one.data for one in client.read_artifacts(artifact_filter=named)}
+
+    before = shown()
+    in_flow(lambda: shout("done", 1))
+    assert [data for id, data in shown().items() if id not in before] == [100.0]
+
+
 def test_a_dry_run_says_why_a_stage_will_run_and_runs_none(tmp_path: Path) -> None:
     in_flow(lambda: shout("ada", 1), folder=tmp_path)
     calls.clear()
