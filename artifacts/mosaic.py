@@ -50,7 +50,8 @@ class Georeference:
 class TiledTiff:
     """Takes windows in any order, each on multiples of TILE_PX, and writes a TIFF when closed: the picture,
     then halves of it (in SubIFDs) until one fits a tile. Compressed tiles wait in a file beside it; what
-    never came stays zero. Same pixels, same bytes; memory holds a few tiles."""
+    never came stays zero. Same pixels, same bytes; memory holds few tiles where neighbours come soon after
+    one another."""
 
     def __init__(
         self,
@@ -69,6 +70,8 @@ class TiledTiff:
             self._levels.append((-(-height // 2), -(-width // 2)))
         # level, row, column of a tile → offset and size in the waiting file
         self._where: dict[tuple[int, int, int], tuple[int, int]] = {}
+        # of the halves: a tile that is not whole yet, and how many of its four are still to come
+        self._growing: dict[tuple[int, int, int], tuple[npt.NDArray[Any], int]] = {}
         self._waiting = path.with_name(path.name + ".tiles")
         self._stream = self._waiting.open("wb+")
 
@@ -88,31 +91,37 @@ class TiledTiff:
             data = zlib.compress(full.tobytes(), LEVEL)
             self._where[place] = (self._stream.seek(0, 2), len(data))
             self._stream.write(data)
+        if place[0] + 1 < len(self._levels):
+            self._halve(place, full)
+
+    def _halve(self, place: tuple[int, int, int], full: npt.NDArray[Any]) -> None:
+        """Into its quarter of the coarser tile: means of colours, every second of all else."""
+        level, row, column = place
+        coarser = (level + 1, row // 2, column // 2)
+        tile, missing = self._growing.pop(coarser, (None, 0))
+        if tile is None:
+            rows, columns = (-(-size // TILE_PX) for size in self._levels[level])
+            missing = min(2, rows - row // 2 * 2) * min(2, columns - column // 2 * 2)
+            tile = np.zeros_like(full)
+        half = TILE_PX // 2
+        top, left = row % 2 * half, column % 2 * half
+        tile[top : top + half, left : left + half] = (
+            cv2.resize(full, (half, half), interpolation=cv2.INTER_AREA) if self._channels else full[::2, ::2]
+        )
+        if missing > 1:
+            self._growing[coarser] = tile, missing - 1
+        else:
+            self._keep(coarser, tile)
 
     def _waiting_bytes(self, place: tuple[int, int, int]) -> bytes:
         offset, size = self._where[place]
         self._stream.seek(offset)
         return self._stream.read(size)
 
-    def _halve(self, level: int) -> None:
-        """Tiles of `level` from those of the finer one: means of colours, every second of all else."""
-        for _, row, column in sorted({(level, r // 2, c // 2) for n, r, c in self._where if n == level - 1}):
-            wide = np.zeros((2 * TILE_PX, 2 * TILE_PX, *self._channels), self._dtype)
-            for r, c in ((0, 0), (0, 1), (1, 0), (1, 1)):
-                finer = (level - 1, 2 * row + r, 2 * column + c)
-                if finer in self._where:
-                    raw = np.frombuffer(zlib.decompress(self._waiting_bytes(finer)), self._dtype)
-                    window = (slice(r * TILE_PX, (r + 1) * TILE_PX), slice(c * TILE_PX, (c + 1) * TILE_PX))
-                    wide[window] = raw.reshape(TILE_PX, TILE_PX, *self._channels)
-            if self._channels:
-                half = cv2.resize(wide, (TILE_PX, TILE_PX), interpolation=cv2.INTER_AREA)
-            else:
-                half = wide[::2, ::2]
-            self._keep((level, row, column), half)
-
     def close(self) -> None:
-        for level in range(1, len(self._levels)):
-            self._halve(level)
+        while self._growing:  # what never came is blank
+            place = min(self._growing)
+            self._keep(place, self._growing.pop(place)[0])
         blank = zlib.compress(
             bytes(TILE_PX * TILE_PX * max(self._channels, default=1) * self._dtype.itemsize), LEVEL
         )

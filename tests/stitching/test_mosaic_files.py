@@ -48,6 +48,9 @@ def test_what_never_came_is_blank(tmp_path: Path) -> None:
     source = tifffile.imread(out.source)
     assert source.dtype == np.uint16
     assert int(source.sum()) == 3 * 88 * 88
+    with tifffile.TiffFile(out.image) as file:
+        coarsest = file.series[0].levels[-1].asarray()
+    assert coarsest.shape == (150, 150, 3) and (coarsest[128:] > 0).all(axis=2).sum() == 22 * 22
 
 
 def test_a_failed_mosaic_leaves_nothing_behind(tmp_path: Path) -> None:
