@@ -1,6 +1,6 @@
 """Rows of `make bench-stitching ARGS="--large COLUMNS ROWS"`: memory of hundreds of photos of 12 MP. They are
 simulated at 2 MP and enlarged, with fresh noise: what they look like is not asked here. With --gsd the mosaic
-is as fine as that, in mm a pixel: `--large 38 16 --gsd 0.255` writes 100,000 × 40,000 px."""
+is as fine as that, in mm a pixel: `--large 19 8 --gsd 0.132` writes 100,000 × 40,000 px."""
 
 import resource
 import time
