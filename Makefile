@@ -37,7 +37,7 @@ train-folds: .venv/.ready  # half an hour each: a network for each fold but the 
 	mkdir -p build/training/folds
 	for k in 1 2 3 4; do \
 	  $(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/fold$$k --fold $$k --steps 8000 \
-	  && $(BIN)/python -m training.export build/training/fold$$k/weights.pt build/training/folds/$$k.onnx 1 -1.5 \
+	  && $(BIN)/python -m training.export build/training/fold$$k/weights.pt build/training/folds/$$k.onnx 1.1 -1 \
 	  || exit 1; done
 
 .venv/.ready: requirements.lock pyproject.toml
