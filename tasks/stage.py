@@ -29,9 +29,7 @@ from prefect._internal.result_records import ResultRecord
 from prefect.artifacts import (
     create_link_artifact,
     create_markdown_artifact,
-    create_progress_artifact,
     create_table_artifact,
-    update_progress_artifact,
 )
 from prefect.cache_policies import CacheKeyFnPolicy
 from prefect.client.schemas.objects import State, TaskRun
@@ -48,6 +46,7 @@ from schemas.file import File
 from schemas.problem import BadInput
 from tasks import run
 from tasks.content_key import content_key, digest_code, digest_inputs, digest_of_look
+from tasks.progress_artifact import ProgressArtifact
 from tasks.run import Event
 
 P = ParamSpec("P")
@@ -207,7 +206,7 @@ class Stage(Generic[P, R]):
             result = self.bare(*args, **kwargs)
             if context is not None:
                 self._seconds[context.task_run.id] = time.monotonic() - began_s
-                _Progress.done(context)
+                ProgressArtifact.done(context)
             return result
 
         body.__name__, body.__module__, body.__doc__ = self.name, self.module, self.__doc__
@@ -280,36 +279,7 @@ def progress(fraction: float) -> None:
         return
     name = context.task.name.replace("-", "_")
     _tell(Event(name, "progress", item_name(_parameters(context)), fraction))
-    _Progress.of(context).show(fraction)
-
-
-class _Progress:
-    """A stage's progress artifact, made at its first word and updated at most every two seconds."""
-
-    _of: dict[Any, "_Progress"] = {}  # noqa: RUF012  # one a task run, until it is done
-
-    def __init__(self, name: str) -> None:
-        self.artifact: Any = create_progress_artifact(progress=0.0, key=f"progress-{name}")
-        self.last_s, self.shown = time.monotonic(), 0.0
-
-    @classmethod
-    def of(cls, context: TaskRunContext) -> "_Progress":
-        if context.task_run.id not in cls._of:  # a task run lives in one thread
-            cls._of[context.task_run.id] = cls(context.task.name)
-        return cls._of[context.task_run.id]
-
-    @classmethod
-    def done(cls, context: TaskRunContext) -> None:
-        """Not every stage says when it has come to its end: a flight ends between two waypoints."""
-        shown = cls._of.pop(context.task_run.id, None)
-        if shown is not None and shown.shown < 1.0:
-            shown.show(1.0)
-
-    def show(self, fraction: float) -> None:
-        now = time.monotonic()
-        if now - self.last_s > 2.0 or fraction >= 1.0:
-            self.last_s, self.shown = now, fraction
-            update_progress_artifact(self.artifact, progress=100.0 * min(fraction, 1.0))
+    ProgressArtifact.of(context).show(fraction)
 
 
 def publish(page: Page) -> None:
