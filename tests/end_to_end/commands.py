@@ -30,7 +30,8 @@ def hairline(
         timeout=timeout_s,
         check=False,
     )
-    assert "Traceback" not in result.stdout + result.stderr
+    said = result.stdout + result.stderr
+    assert "Traceback" not in said, said
     if expect is not None:
-        assert result.returncode == expect, result.stdout + result.stderr
+        assert result.returncode == expect, said
     return result
