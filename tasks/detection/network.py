@@ -6,6 +6,7 @@ that are multiples of STRIDE.
 """
 
 import hashlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,13 +18,17 @@ from numba import njit
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
 from tasks.detection.sauvola import Mask
+from tasks.detection.windows import Window, windows
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
 SHA256 = "08a67496a41852c97b5d38bac2ed10a285b4975b8e30f59557c1e5bf7b6080f3"
 STRIDE = 32
-TILE_PX = 2048
+OCTAVES = (2, 1)  # our network is asked at 1 / 2^octave of the size too
+SEEN_PX = 7_000_000  # at once: 120 bytes each (measured)
 HALO_PX = 224  # of an octave: what lies further away changes a probability by 1/255 at most (measured)
+STEP_PX = STRIDE << 2  # windows begin at multiples of it: so do their pixels at each octave
+BAND_PX = 1024  # rows of an image that are read and reduced at once
 HALF = 0.5  # what its answer at half size counts where a crack is wide enough to be seen at quarter size
 FILL_PX = 63  # what is not known is filled from this far around
 
@@ -61,24 +66,62 @@ def our_model() -> Model:
     return Model(content, OURS.name, at_smaller_sizes=True, limits=OUR_LIMITS)
 
 
+class Answer(NamedTuple):
+    """What the network says of a window and the halo around it, at 1 / 2^octave of their size."""
+
+    logit: Logits
+    top_px: int
+    left_px: int
+    octave: int
+
+    def at(self, window: Window) -> Logits:
+        """Logits of a window inside, at full size."""
+        top, bottom = window.top - self.top_px, window.bottom - self.top_px
+        left, right = window.left - self.left_px, window.right - self.left_px
+        if self.octave == 0:
+            return self.logit[top:bottom, left:right]
+        step = 1 << self.octave
+        y, x = max(0, top // step - 1), max(0, left // step - 1)  # one more on each side, to lie between
+        part = self.logit[y : -(-bottom // step) + 1, x : -(-right // step) + 1]
+        size = part.shape[1] * step, part.shape[0] * step
+        whole = cv2.resize(part, size, interpolation=cv2.INTER_LINEAR)
+        return np.asarray(whole[top - y * step : bottom - y * step, left - x * step : right - x * step])
+
+
 def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:
-    """(H, W) of the whole image, tile by tile; 0 where nothing is known. BadInput for an unfit network."""
-    nets = [_read(model) for _ in range(3 if model.at_smaller_sizes else 1)]  # each keeps its size: faster
-    height, width = raster.height_px, raster.width_px
-    whole = np.zeros((height, width), dtype=np.uint8)
-    corners = [(y, x) for y in range(0, height, TILE_PX) for x in range(0, width, TILE_PX)]
-    for done, (y, x) in enumerate(corners, start=1):
-        bottom, right = min(height, y + TILE_PX), min(width, x + TILE_PX)
-        valid = raster.valid(y, bottom, x, right)
+    """(H, W) of the whole image, window by window; 0 where nothing is known.
+    BadInput for an unfit network."""
+    net = _read(model)
+    image = Window(0, raster.height_px, 0, raster.width_px)
+    whole = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
+    done_px = 0
+    for window, wider in _windows(net, raster, image, OCTAVES if model.at_smaller_sizes else (), model):
+        valid = raster.valid(*window)
         if valid.any():
-            window = (y, bottom, x, right)
-            logit = _tile(nets[0], raster, window, 0, model)
-            if model.at_smaller_sizes:
-                _heed(logit, *(_tile(nets[octave], raster, window, octave, model) for octave in (1, 2)))
-            _fill(whole[y:bottom, x:right], logit, valid)
+            logit = _answer(net, raster, window, 0, model).at(window)
+            if wider:
+                quarter, half = (answer.at(window) for answer in wider)
+                _heed(logit, half, quarter)
+            _fill(whole[window.top : window.bottom, window.left : window.right], logit, valid)
+        done_px += window.area_px
         if on_progress is not None:
-            on_progress(done / len(corners))
+            on_progress(done_px / image.area_px)
     return whole
+
+
+def _windows(
+    net: Any, raster: Raster, of: Window, octaves: tuple[int, ...], model: Model
+) -> Iterator[tuple[Window, tuple[Answer, ...]]]:
+    """The windows of `of`, each with what the network says of a wider one at each of the octaves."""
+    image = Window(0, raster.height_px, 0, raster.width_px)
+    octave = octaves[0] if octaves else 0
+    for window in windows(of, image, HALO_PX << octave, SEEN_PX << 2 * octave, STEP_PX):
+        if not octaves:
+            yield window, ()
+        elif raster.valid(*window).any():
+            answer = _answer(net, raster, window, octave, model)
+            for part, wider in _windows(net, raster, window, octaves[1:], model):
+                yield part, (answer, *wider)
 
 
 @njit(cache=True, nogil=True)
@@ -104,20 +147,34 @@ def _fill(whole: Probability, logit: Logits, valid: Mask) -> None:
             whole[y, x] = np.uint8(p) if valid[y, x] else np.uint8(0)
 
 
-def _tile(net: Any, raster: Raster, window: tuple[int, int, int, int], octave: int, model: Model) -> Logits:
-    """Logits of a window (rows, then columns), seen with its halo at 1 / 2^octave of its size."""
-    halo_px = HALO_PX << octave
-    top, left = max(0, window[0] - halo_px), max(0, window[2] - halo_px)
-    bottom, right = min(raster.height_px, window[1] + halo_px), min(raster.width_px, window[3] + halo_px)
-    rgb = filled(raster.rgb(top, bottom, left, right), raster.valid(top, bottom, left, right))
-    inner = slice(window[0] - top, window[1] - top), slice(window[2] - left, window[3] - left)
-    return _logits(net, rgb, octave, model)[inner]
+def _answer(net: Any, raster: Raster, window: Window, octave: int, model: Model) -> Answer:
+    image = Window(0, raster.height_px, 0, raster.width_px)
+    seen = window.grown(HALO_PX << octave, image)
+    return Answer(_logits(net, _reduced(raster, seen, octave), model), seen.top, seen.left, octave)
+
+
+def _reduced(raster: Raster, window: Window, octave: int) -> Pixels:
+    """(H, W, 3) of a window at 1 / 2^octave of its size, what is unknown filled; read band by band."""
+    bands: list[Pixels] = []
+    for top in range(window.top, window.bottom, BAND_PX):
+        bottom = min(window.bottom, top + BAND_PX)
+        y0, y1 = max(window.top, top - FILL_PX), min(window.bottom, bottom + FILL_PX)
+        read = Window(y0, y1, window.left, window.right)
+        rgb = filled(raster.rgb(*read), raster.valid(*read))[top - y0 : bottom - y0]
+        down, right = -rgb.shape[0] % (1 << octave), -rgb.shape[1] % (1 << octave)
+        even = cv2.copyMakeBorder(rgb, 0, down, 0, right, cv2.BORDER_REFLECT_101)
+        size = even.shape[1] >> octave, even.shape[0] >> octave
+        small = cv2.resize(even, size, interpolation=cv2.INTER_AREA) if octave else even
+        bands.append(np.asarray(small, dtype=np.uint8))
+    return np.concatenate(bands)
 
 
 def filled(rgb: Pixels, valid: Mask) -> Pixels:
     """(H, W, 3): what is not valid takes the mean of what is around it: its rim looks like nothing."""
     if valid.all():
         return rgb
+    if not valid.any():
+        return np.full_like(rgb, 128)
     size = (FILL_PX, FILL_PX)
     weight = valid.astype(np.float32)
     known = cv2.boxFilter(weight, -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
@@ -134,14 +191,10 @@ def _read(model: Model) -> Any:
         raise _unfit(model, f"cannot be read as an ONNX network ({_first_words(problem)})") from None
 
 
-def _logits(net: Any, rgb: Pixels, octave: int, model: Model) -> Logits:
-    """(H, W) of (H, W, 3), made 2^octave times smaller for the network and its answer as much larger."""
+def _logits(net: Any, rgb: Pixels, model: Model) -> Logits:
+    """(H, W) of (H, W, 3)."""
     height, width = rgb.shape[:2]
-    step = STRIDE << octave
-    seen = cv2.copyMakeBorder(rgb, 0, -height % step, 0, -width % step, cv2.BORDER_REFLECT_101)
-    size = seen.shape[1], seen.shape[0]
-    if octave:
-        seen = cv2.resize(seen, (size[0] >> octave, size[1] >> octave), interpolation=cv2.INTER_AREA)
+    seen = cv2.copyMakeBorder(rgb, 0, -height % STRIDE, 0, -width % STRIDE, cv2.BORDER_REFLECT_101)
     try:
         net.setInput(cv2.dnn.blobFromImage(seen, 1.0 / 255.0))
         logit = np.asarray(net.forward(), dtype=np.float32)
@@ -149,8 +202,7 @@ def _logits(net: Any, rgb: Pixels, octave: int, model: Model) -> Logits:
         raise _unfit(model, f"does not run on a tile of an image ({_first_words(problem)})") from None
     if logit.shape != (1, 1, *seen.shape[:2]):
         raise _unfit(model, f"answers a tile of {seen.shape[:2]} px with the shape {logit.shape}")
-    answer = cv2.resize(logit[0, 0], size, interpolation=cv2.INTER_LINEAR) if octave else logit[0, 0]
-    return np.asarray(answer, dtype=np.float32)[:height, :width]
+    return logit[0, 0, :height, :width]
 
 
 def _unfit(model: Model, what: str) -> BadInput:
