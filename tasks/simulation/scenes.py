@@ -6,7 +6,7 @@ from threading import Lock
 from typing import Literal
 
 from schemas.inspection import CameraInput, Inspection, SimulationInput
-from schemas.settings import DetectSettings, PlanSettings
+from schemas.settings import PlanSettings
 from schemas.vehicle import Vehicle
 from tasks.simulation import arch, bridge, facade, wall
 from tasks.simulation.scene import Scene
@@ -19,10 +19,6 @@ SCENES: dict[str, Callable[[int], Scene]] = {
     "facade": facade.facade,
 }
 VEHICLE = Vehicle(radius_m=0.4, clearance_m=1.0, position_bias_m=0.1, position_jitter_m=0.03)  # RTK
-
-# The scenes' cracks wander smoothly; the network has learned from real ones, which are jagged, and takes
-# these for cables (tasks/detection/hairline.md, "Known failures").
-DETECT = DetectSettings(method="ridge")
 
 _building = Lock()  # photos of several surfaces are taken at a time, of one scene
 
@@ -44,7 +40,7 @@ def ready_inspection(scene: Literal["bridge", "wall"]) -> Inspection:
     simulation = SimulationInput(scene=scene)
     if scene == "wall":
         camera = CameraInput.model_validate(wall.CAMERA.model_dump())
-        return Inspection(name="demo-wall", simulation=simulation, camera=camera, detect=DETECT)
+        return Inspection(name="demo-wall", simulation=simulation, camera=camera)
     return Inspection(
         name="demo",
         simulation=simulation,
@@ -53,5 +49,4 @@ def ready_inspection(scene: Literal["bridge", "wall"]) -> Inspection:
         vehicle=VEHICLE,
         origin=bridge.ORIGIN,
         plan=PlanSettings(gsd_mm_px=bridge.GSD_MM_PX, overlap=0.5, surfaces=BRIDGE_SURFACES),
-        detect=DETECT,
     )
