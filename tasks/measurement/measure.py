@@ -9,12 +9,14 @@ from scipy.ndimage import gaussian_filter1d
 
 from schemas.raster import Progress, Raster
 from tasks.measurement.centreline import Points, arc_length, normals, orientation_deg, smooth, straight_ends
-from tasks.measurement.profiles import Across, across
+from tasks.measurement.profiles import STEP_PX, Across, across
 from tasks.measurement.psf import estimate_psf_px
 from tasks.measurement.skeleton import Mask, Path, crack_paths
 from tasks.measurement.width_profile import Widths, measure_widths
 
-LEAST_HALF_PX, LARGEST_HALF_PX = 8.0, 60.0  # half length of a profile
+LEAST_HALF_PX = 8.0  # half length of a profile
+FINE_HALF_PX = 60.0  # longer profiles are sampled as much more coarsely: a wide crack costs no more than this
+LEAST_PSF_PX = 0.4  # of such a profile's own, longer pixels
 BESIDE_PX = 6.0  # of a profile lie beyond the crack's edges, at least
 FAINTEST = 0.03  # median darkness of a crack in linear light: what is fainter is no crack
 
@@ -48,6 +50,7 @@ class MeasuredImage(NamedTuple):
 class _Line(NamedTuple):
     centreline: Points
     profiles: Across
+    coarser: float  # 1 or more: the profiles' pixels are as many times longer than the image's
     network: int
 
 
@@ -71,7 +74,9 @@ def measure_cracks(
             lines.append(line)
         if on_progress is not None:
             on_progress((n + 1) / len(paths))
-    psf_px = estimate_psf_px([(p.offsets_px, p.darkness[p.usable]) for _, p, _ in lines])
+    psf_px = estimate_psf_px(
+        [(p.offsets_px, p.darkness[p.usable]) for _, p, coarser, _ in lines if coarser == 1.0]
+    )
     cracks = [_measured(line, psf_px) for line in lines]
     return MeasuredImage(sorted(cracks, key=lambda crack: crack.middle_px), rejected, psf_px)
 
@@ -81,15 +86,16 @@ def _line(raster: Raster, path: Path, mask: Mask, thickness: npt.NDArray[np.floa
     at = np.rint(path.points).astype(int)
     inside = (at[:, 1] < thickness.shape[0]) & (at[:, 0] < thickness.shape[1])
     width = float(np.percentile(thickness[at[inside, 1], at[inside, 0]], 75))
-    half = float(np.clip(1.0 * width + BESIDE_PX, LEAST_HALF_PX, LARGEST_HALF_PX))
+    half = max(width + BESIDE_PX, LEAST_HALF_PX)
+    coarser = max(1.0, half / FINE_HALF_PX)
     centreline = smooth(straight_ends(path.points, round(width / 2), mask))
-    profiles = across(raster, centreline, half)
+    profiles = across(raster, centreline, half, coarser * STEP_PX)
     near = np.abs(profiles.offsets_px) <= width / 2 + 2.0
     dark = np.maximum(profiles.darkness[:, near], 0.0)
     shift = (dark * profiles.offsets_px[near]).sum(axis=1) / np.maximum(dark.sum(axis=1), 1e-3)
     shift = gaussian_filter1d(np.where(profiles.usable, shift, 0.0), 3.0, mode="nearest")
     centreline = smooth(centreline + shift[:, None] * normals(centreline))
-    return _Line(centreline, across(raster, centreline, half), path.network)
+    return _Line(centreline, across(raster, centreline, half, coarser * STEP_PX), coarser, path.network)
 
 
 def _peak(profiles: Across) -> npt.NDArray[np.float64]:
@@ -99,11 +105,13 @@ def _peak(profiles: Across) -> npt.NDArray[np.float64]:
 
 
 def _measured(line: _Line, psf_px: float) -> MeasuredCrack:
-    profiles = line.profiles
-    known = measure_widths(profiles.offsets_px, profiles.darkness[profiles.usable], psf_px)
+    profiles, coarser = line.profiles, line.coarser
+    blur = psf_px if coarser == 1.0 else max(psf_px / coarser, LEAST_PSF_PX)
+    known = measure_widths(profiles.offsets_px / coarser, profiles.darkness[profiles.usable], blur)
     along = arc_length(line.centreline)
     width, sigma = (  # what lies on unknown pixels takes the width of its neighbours
-        np.interp(along, along[profiles.usable], values) for values in (known.width_px, known.sigma_px)
+        np.interp(along, along[profiles.usable], coarser * values)
+        for values in (known.width_px, known.sigma_px)
     )
     widths = Widths(width, sigma, known.is_upper_bound)
     return MeasuredCrack(line.centreline, along, widths, line.network)

@@ -38,10 +38,10 @@ def linear_luminance(rgb: Pixels) -> npt.NDArray[np.float64]:
     return np.asarray(sum(channels))
 
 
-def across(raster: Raster, centreline: Points, half_px: float) -> Across:
+def across(raster: Raster, centreline: Points, half_px: float, step_px: float = STEP_PX) -> Across:
     """Darkness 1 − I / background along the normals, ±half_px about each point of the centreline."""
-    count = int(np.ceil(half_px / STEP_PX))
-    offsets: Values = np.arange(-count, count + 1, dtype=np.float64) * STEP_PX
+    count = int(np.ceil(half_px / step_px))
+    offsets: Values = np.arange(-count, count + 1, dtype=np.float64) * step_px
     direction = normals(centreline)
     light = np.empty((len(centreline), len(offsets)))
     usable = np.empty(len(centreline), dtype=bool)

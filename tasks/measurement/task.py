@@ -12,7 +12,7 @@ from artifacts.page import Page, page_key
 from artifacts.picture import lines_markdown
 from artifacts.raster import MosaicRaster, TiffWindows, read_mask
 from schemas.crack import Crack, Measurement
-from schemas.detection import Detection, Patterns
+from schemas.detection import DRAWN, Detection, Patterns
 from schemas.mosaic import Mosaic
 from schemas.settings import DetectSettings
 from tasks.stage import progress, stage
@@ -44,7 +44,9 @@ def measure(
 
     files = store.current()
     gsd = mosaic.gsd_mm_px
-    least_px = settings.min_length_px if gsd is None else settings.min_length_mm / gsd
+    side_px = min(mosaic.height_px, mosaic.width_px)
+    # Who drew a short crack meant it: from a drawn mask only specks are left out.
+    least_px = settings.least_px(None if detection.method == DRAWN else gsd, side_px)
     image, coverage = files.path(mosaic.image), files.path(mosaic.coverage)
     with MosaicRaster(image, coverage, mosaic.name, files.path(patterns.mask)) as raster:
         mask = read_mask(files.path(detection.mask), mosaic.name) > 0

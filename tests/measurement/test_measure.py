@@ -27,6 +27,17 @@ def test_width_of_an_even_slit(width: float, bias_px: float, darkness: float) ->
     assert not found.cracks[0].widths.is_upper_bound
 
 
+@pytest.mark.parametrize("width", [40.0, 60.0, 110.0, 200.0])
+def test_width_of_a_gaping_crack(width: float) -> None:
+    """As a photo from near shows it. The mask is drawn, and a pixel too narrow on both sides."""
+    drawn = drawn_crack(lambda x: 0 * x + width, size=(500, 700))
+    y, x = np.mgrid[:500, :700]
+    mask = np.abs(y - np.interp(x, drawn.x, drawn.y)) < width / 2 - 1
+    (crack,) = measure_cracks(ArrayRaster(drawn.rgb), mask, 30, 15).cracks
+    assert crack.widths.width_px.mean() == pytest.approx(width, rel=0.005, abs=0.5)
+    assert crack.widths.width_px.std() < 1.5
+
+
 def test_a_narrow_slit_with_nothing_to_anchor_it_gets_an_upper_bound() -> None:
     found = measured(drawn_crack(lambda x: 0 * x + 1.0)).cracks[0].widths
     assert found.is_upper_bound and 1.0 <= found.width_px.max() < 2.5
