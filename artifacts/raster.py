@@ -15,6 +15,7 @@ from schemas.problem import BadInput
 from schemas.raster import Pixels
 
 REMEDY = "Stitch this surface again"
+MOST_LEVELS = 16  # that somebody draws: a level for each kind of crack
 
 
 class TiffWindows:
@@ -107,6 +108,21 @@ def read_mask(path: Path, name: str) -> Pixels:
     if mask is None:
         raise BadInput(name, "its mask cannot be read", REMEDY)
     return np.asarray(mask, dtype=np.uint8)
+
+
+def read_drawn_mask(path: Path, name: str) -> npt.NDArray[np.bool_]:
+    """(H, W) of a mask that somebody drew, of any image format: True where it is not 0. Where JPEG or
+    smoothing have made more levels of the few that were drawn, the edge lies half-way up. BadInput by
+    name."""
+    drawn = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if drawn is None:
+        raise BadInput(name, "is no image", "Give the mask as PNG, not 0 where there is a crack")
+    blurred = np.count_nonzero(np.bincount(drawn.ravel(), minlength=256)) > MOST_LEVELS
+    mask: npt.NDArray[np.bool_] = drawn >= (drawn.max() / 2 if blurred else 1)
+    if mask.mean() > 0.5:
+        share = f"marks {100 * mask.mean():.0f} % of the image as crack"
+        raise BadInput(name, share, "Where it is black on white, invert it: cracks are what is not 0")
+    return mask
 
 
 def write_mask(mask: npt.NDArray[np.bool_] | Pixels, path: Path) -> None:

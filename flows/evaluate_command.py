@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import cv2
 import numpy as np
@@ -20,8 +20,11 @@ from schemas.mosaic import Mosaic
 from schemas.problem import BadInput, LeftOut
 from schemas.settings import DetectSettings
 
+if TYPE_CHECKING:
+    from tasks.assessment.curves import Levels
+    from tasks.assessment.evaluation import Tally
+
 Mask = npt.NDArray[np.bool_]
-Probability = npt.NDArray[np.uint8]
 
 TOLERANCE_PX = 2  # of the curves, and of what is worst
 WORST = 8  # images shown
@@ -98,15 +101,15 @@ def compare(
     gsd_mm_px: float | None,
     progress: Callable[[float], None],
 ) -> Comparison:
-    """Every method on every image."""
-    from tasks.assessment.task import curves, f1_of
-    from tasks.assessment.task import evaluate as evaluate_masks
+    """Every method on every image, of which only counts are kept, and the worst few."""
+    from tasks.assessment.task import curves, f1_of, levels, tally
+    from tasks.assessment.task import evaluate as evaluate_tallies
     from tasks.detection.task import crack_probability
 
     drawn = {path.stem: path for path in photos_in(masks)}
-    found: dict[str, list[tuple[Mask, Mask]]] = {name: [] for name in methods}
-    judged: list[Judged] = []
-    probabilities: list[tuple[Probability, Mask]] = []
+    tallies: dict[str, list[Tally]] = {name: [] for name in methods}
+    worst: list[Judged] = []
+    of_all: Levels | None = None
     problems = []
     paths = photos_in(images)
     for number, path in enumerate(paths, start=1):
@@ -115,20 +118,22 @@ def compare(
             mosaic, patterns = prepared(path, gsd_mm_px, truth.shape)
             of_methods = {name: mask_of(mosaic, patterns, settings) for name, settings in methods.items()}
             if "hairline" in methods:
-                probabilities.append((crack_probability(mosaic, patterns), truth))
+                seen = levels(crack_probability(mosaic, patterns), truth, TOLERANCE_PX)
+                of_all = seen if of_all is None else of_all + seen
             for name, mask in of_methods.items():
-                found[name].append((mask, truth))
-            first = next(iter(of_methods.values()))
-            judged.append(Judged(path, truth, first, f1_of(first, truth, TOLERANCE_PX)))
+                tallies[name].append(tally(mask, truth))
+            first = next(iter(methods))
+            judged = Judged(path, truth, of_methods[first], f1_of(tallies[first][-1], TOLERANCE_PX))
+            worst = sorted([*worst, judged], key=lambda one: one.f1)[:WORST]
         except BadInput as problem:
             problems.append(problem)
         progress(number / len(paths))
-    if not judged:
+    if not worst:
         raise problems[0]
     return Comparison(
-        [one for name, pairs in found.items() for one in evaluate_masks(name, pairs)],
-        curves(probabilities, TOLERANCE_PX) if probabilities else None,
-        sorted(judged, key=lambda one: one.f1)[:WORST],
+        [one for name, images_of in tallies.items() for one in evaluate_tallies(name, images_of)],
+        None if of_all is None else curves(of_all, TOLERANCE_PX),
+        worst,
         [LeftOut.because("evaluation", problem) for problem in problems],
     )
 
@@ -159,10 +164,9 @@ def mask_of(mosaic: Mosaic, patterns: Patterns, settings: DetectSettings) -> Mas
 def read_mask(drawn: dict[str, Path], image: Path) -> Mask:
     if image.stem not in drawn:
         raise BadInput(image.name, "has no mask of the same name", "Add it to the folder of masks")
-    mask = cv2.imread(str(drawn[image.stem]), cv2.IMREAD_GRAYSCALE)
-    if mask is None:
-        raise BadInput(drawn[image.stem].name, "is no image", "Give the mask as PNG")
-    return np.asarray(mask) > 0
+    from artifacts.raster import read_drawn_mask
+
+    return read_drawn_mask(drawn[image.stem], drawn[image.stem].name)
 
 
 def as_table(evaluations: list[Evaluation]) -> Table:

@@ -218,6 +218,7 @@ def measure(image: Path, mask: Path, *, out: OutFolder, gsd_mm_px: float | None 
     """
     from artifacts import store
     from flows.results import write_json
+    from schemas.detection import DRAWN
     from schemas.settings import AssessSettings, DetectSettings, PatternSettings
     from tasks.assessment.task import assess
     from tasks.detection.task import given_mask
@@ -235,8 +236,6 @@ def measure(image: Path, mask: Path, *, out: OutFolder, gsd_mm_px: float | None 
         patterns = remove_patterns.bare(mosaic, PatternSettings(remove=False))
         detection = given_mask(mosaic, store.current().put(mask), mask.name)
         measured = measure_cracks.bare(mosaic, patterns, detection, DetectSettings())
-        report = assess.bare(
-            image.name, "given mask", (mosaic,), (measured,), (patterns,), (), (), AssessSettings()
-        )
+        report = assess.bare(image.name, DRAWN, (mosaic,), (measured,), (patterns,), (), (), AssessSettings())
         write_json(out / "cracks.json", report)
     say(f"{len(report.cracks)} cracks: {out / 'cracks.json'}")

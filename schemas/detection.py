@@ -26,6 +26,9 @@ class Patterns(Peaks):
     inspectable_px: int  # what is left
 
 
+DRAWN = "given mask"  # the method of a mask that somebody drew or another program made
+
+
 class Detection(Contract):
     mask: File  # PNG, 0/255, the size of the image
     method: str

@@ -87,6 +87,12 @@ class DetectSettings(Contract):
     min_length_mm: float = Field(default=50.0, gt=0)  # shorter things are no cracks where a scale is known
     min_length_px: float = Field(default=30.0, gt=0)  # and where none is
 
+    def least_px(self, gsd_mm_px: float | None, side_px: int) -> float:
+        """Least length of a crack in an image whose shorter side is `side_px`: where that shows less in all,
+        from near, half of it."""
+        least_px = self.min_length_px if gsd_mm_px is None else self.min_length_mm / gsd_mm_px
+        return min(least_px, side_px / 2)
+
     @model_validator(mode="after")
     def _a_model_for_onnx_alone(self) -> Self:
         if (self.method == "onnx") != (self.model is not None):

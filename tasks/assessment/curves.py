@@ -3,8 +3,6 @@
 Everything is counted in one pass over each image, as histograms of the 256 levels that a probability has.
 """
 
-from collections.abc import Iterable
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -25,9 +23,9 @@ def levels(probability: Probability, truth: Mask, tolerance_px: int) -> Levels:
     return np.array([np.bincount(np.ravel(one), minlength=256) for one in which])
 
 
-def curves(images: Iterable[tuple[Probability, Mask]], tolerance_px: int) -> Curves:
-    """Of all pixels of all images."""
-    found, true, right, reached = np.sum([levels(p, t, tolerance_px) for p, t in images], axis=0)
+def curves(of_all: Levels, tolerance_px: int) -> Curves:
+    """Of all pixels of all images, from the sum of their levels."""
+    found, true, right, reached = of_all
     found_right, found_from, reached_from = (_from_level(n) for n in (right, found, reached))
     middle = (np.arange(256) / 255 * BINS).astype(int).clip(max=BINS - 1)
     pixels, cracks, said = (

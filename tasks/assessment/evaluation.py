@@ -6,7 +6,7 @@ pixel of rim on a perfect mask of four gives F1 .80. So centrelines are scored a
 other's: that is length found and length false, which an engineer reads.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
@@ -56,18 +56,25 @@ def scores(counts: Counts) -> Scores:
     return Scores(precision=precision, recall=recall, f1=2 * precision * recall / both if both else 0.0)
 
 
-def evaluate(method: str, pairs: Iterable[tuple[Mask, Mask]]) -> tuple[Evaluation, ...]:
-    """One Evaluation for each tolerance over (found, truth) masks; at least one pair."""
-    areas: list[list[Counts]] = []
-    lines: list[list[Counts]] = []
-    pixels = 0
-    for found, truth in pairs:
-        areas.append([count(found, truth, d) for d in TOLERANCES_PX])
-        thin = centreline(found), centreline(truth)
-        lines.append([count(*thin, d) for d in TOLERANCES_PX])
-        pixels += found.size
+class Tally(NamedTuple):
+    """Of one image: all that an evaluation needs of it, so that its masks need not be kept."""
+
+    areas: tuple[Counts, ...]  # at each tolerance
+    lines: tuple[Counts, ...]
+    pixels: int
+
+
+def tally(found: Mask, truth: Mask) -> Tally:
+    thin = centreline(found), centreline(truth)
+    areas = tuple(count(found, truth, d) for d in TOLERANCES_PX)
+    return Tally(areas, tuple(count(*thin, d) for d in TOLERANCES_PX), found.size)
+
+
+def evaluate(method: str, images: Sequence[Tally]) -> tuple[Evaluation, ...]:
+    """One Evaluation for each tolerance; at least one image."""
+    pixels = sum(one.pixels for one in images)
     return tuple(
-        _evaluation(method, d, [row[k] for row in areas], [row[k] for row in lines], pixels)
+        _evaluation(method, d, [one.areas[k] for one in images], [one.lines[k] for one in images], pixels)
         for k, d in enumerate(TOLERANCES_PX)
     )
 

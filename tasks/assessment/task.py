@@ -1,7 +1,7 @@
 """Stages: the cracks' kind and severity, what was inspected and what was not; and the report of it all."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from artifacts import store
@@ -23,8 +23,8 @@ from schemas.surface import Surface
 from tasks.stage import stage
 
 if TYPE_CHECKING:
-    from tasks.assessment.curves import Probability
-    from tasks.assessment.evaluation import Mask
+    from tasks.assessment.curves import Levels, Probability
+    from tasks.assessment.evaluation import Mask, Tally
 
 
 def pages(inputs: Mapping[str, Any], result: CrackReport) -> list[Page]:
@@ -60,25 +60,39 @@ def assess(
     return report_of(inspection, method, mosaics, measurements, patterns, surfaces, left_out, settings)
 
 
-def evaluate(method: str, pairs: Iterable[tuple["Mask", "Mask"]]) -> tuple[Evaluation, ...]:
-    """Agreement of (found, drawn) masks, each (H, W) bool; no stage: only the command line asks for it."""
-    from tasks.assessment.evaluation import evaluate as evaluate_masks
+def tally(found: "Mask", truth: "Mask") -> "Tally":
+    """Agreement of a found and a drawn mask, (H, W) bool; no stage: only the command line asks for it."""
+    from tasks.assessment.evaluation import tally as tally_masks
 
-    return evaluate_masks(method, pairs)
+    return tally_masks(found, truth)
 
 
-def curves(images: Iterable[tuple["Probability", "Mask"]], tolerance_px: int) -> Curves:
-    """Precision, recall and calibration of (probability, drawn mask), each (H, W)."""
+def evaluate(method: str, images: "Sequence[Tally]") -> tuple[Evaluation, ...]:
+    """A method's agreement over all images, at each tolerance."""
+    from tasks.assessment.evaluation import evaluate as evaluate_tallies
+
+    return evaluate_tallies(method, images)
+
+
+def levels(probability: "Probability", truth: "Mask", tolerance_px: int) -> "Levels":
+    """What `curves` needs of one image; levels of several images add up."""
+    from tasks.assessment.curves import levels as levels_of
+
+    return levels_of(probability, truth, tolerance_px)
+
+
+def curves(of_all: "Levels", tolerance_px: int) -> Curves:
+    """Precision, recall and calibration of a network's probabilities."""
     from tasks.assessment.curves import curves as curves_of
 
-    return curves_of(images, tolerance_px)
+    return curves_of(of_all, tolerance_px)
 
 
-def f1_of(found: "Mask", truth: "Mask", tolerance_px: int) -> float:
+def f1_of(one: "Tally", tolerance_px: int) -> float:
     """Of one image."""
-    from tasks.assessment.evaluation import count, scores
+    from tasks.assessment.evaluation import TOLERANCES_PX, scores
 
-    return scores(count(found, truth, tolerance_px)).f1
+    return scores(one.areas[TOLERANCES_PX.index(tolerance_px)]).f1
 
 
 def near(mask: "Mask", radius_px: int) -> "Mask":

@@ -8,6 +8,9 @@ import numpy.typing as npt
 
 from tasks.detection.sauvola import Mask
 
+ELONGATION = 5.0  # least extent over mean width of a crack, and of a crack's network
+THROUGH = 2.7  # of one that runs through the image; a disc has 2.5
+
 
 class Components(NamedTuple):
     """8-connected components. Label 0 is the background; arrays are indexed by label."""
@@ -25,6 +28,15 @@ class Components(NamedTuple):
     def elongation(self) -> npt.NDArray[np.float64]:
         """Extent over mean width; a full square has 2, a disc 2.5, a crack of 3 × 100 px 33."""
         return self.extent_px**2 / np.maximum(self.area_px, 1.0)
+
+    @property
+    def thin(self) -> npt.NDArray[np.bool_]:
+        """Which are as thin as cracks. Of what runs through the image from side to side, seen from near,
+        nobody sees how long it is: there less is enough."""
+        x, y, width, height = self.boxes.T
+        high, wide = self.labels.shape
+        sides = (x == 0).astype(int) + (y == 0) + (x + width == wide) + (y + height == high)
+        return np.asarray(self.elongation >= np.where(sides >= 2, THROUGH, ELONGATION))
 
     def box(self, label: int) -> tuple[int, int, int, int]:
         x, y, width, height = (int(n) for n in self.boxes[label])
@@ -47,11 +59,8 @@ def components(mask: Mask) -> Components:
     return Components(np.asarray(labels, dtype=np.int32), area, np.asarray(stats[:, :4], dtype=np.int32))
 
 
-ELONGATION = 5.0  # least extent over mean width of a crack, and of a crack's network
-
-
 def long_and_thin(levels: npt.NDArray[np.uint8], seed_level: int, min_length_px: float) -> Mask:
     """Components of non-zero `levels` that are long, thin and hold a pixel of at least `seed_level`."""
     found = components(levels > 0)
-    which = (found.extent_px >= min_length_px) & (found.elongation >= ELONGATION)
+    which = (found.extent_px >= min_length_px) & found.thin
     return found.keep(which & found.holding(levels >= seed_level))

@@ -10,7 +10,7 @@ from schemas.raster import ArrayRaster, Pixels, Progress, Raster
 from schemas.settings import DetectSettings
 from tasks.detection.bands import by_bands
 from tasks.detection.candidates import Scored, candidates
-from tasks.detection.components import ELONGATION, long_and_thin
+from tasks.detection.components import long_and_thin
 from tasks.detection.edges import without_soft
 from tasks.detection.global_threshold import PAPER, Histogram, darker_than, from_peaks, otsu
 from tasks.detection.joints import Joint, without_joints
@@ -58,7 +58,7 @@ def detect_raster(
     model: Model | None = None,
 ) -> DetectionArrays:
     """Cracks of an image of any size, read piece by piece."""
-    least_px = settings.min_length_px if gsd_mm_px is None else settings.min_length_mm / gsd_mm_px
+    least_px = settings.least_px(gsd_mm_px, min(raster.height_px, raster.width_px))
     if settings.method in ("hairline", "onnx"):
         return _by_network(raster, model or our_model(), settings.min_score, least_px, on_progress)
     window = (settings.window_px or WINDOW_PX) | 1
@@ -76,7 +76,7 @@ def _by_network(
 ) -> DetectionArrays:
     """What a network holds for cracks, long and likely enough as a whole, less what is straight."""
     given = candidates(probability(raster, model, on_progress), model.limits)
-    long = (given.found.extent_px >= least_px) & (given.found.elongation >= ELONGATION)
+    long = (given.found.extent_px >= least_px) & given.found.thin
     likely = given.score >= min_score
     mask, joints = without_joints(given.found.keep(long & likely), JOINT_LENGTHS * least_px, least_px)
     mask = long_and_thin(mask.astype(np.uint8), 1, least_px)

@@ -3,15 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from artifacts import store
 from artifacts.page import Page, page_key
 from artifacts.picture import mask_markdown
-from artifacts.raster import MosaicRaster, write_mask
-from schemas.detection import Detection, Patterns
+from artifacts.raster import MosaicRaster, read_drawn_mask, write_mask
+from schemas.detection import DRAWN, Detection, Patterns
 from schemas.file import File
 from schemas.mosaic import Mosaic
 from schemas.problem import BadInput
@@ -83,9 +82,7 @@ def crack_probability(mosaic: Mosaic, patterns: Patterns) -> npt.NDArray[np.uint
 
 def given_mask(mosaic: Mosaic, mask: File, name: str) -> Detection:
     """A mask that somebody drew or another program made, as a detection. Raises BadInput by name."""
-    drawn = cv2.imread(str(store.current().path(mask)), cv2.IMREAD_GRAYSCALE)
-    if drawn is None:
-        raise BadInput(name, "is no image", "Give the mask as PNG, not 0 where there is a crack")
+    drawn = read_drawn_mask(store.current().path(mask), name)
     if drawn.shape != (mosaic.height_px, mosaic.width_px):
         raise BadInput(
             name,
@@ -93,8 +90,6 @@ def given_mask(mosaic: Mosaic, mask: File, name: str) -> Detection:
             "Give the mask of this very image",
         )
     with store.current().scratch() as folder:
-        write_mask(np.asarray(drawn) > 0, folder / "cracks.png")
+        write_mask(drawn, folder / "cracks.png")
         entered = store.current().put(folder / "cracks.png")
-    return Detection(
-        mask=entered, method="given mask", crack_px=int((drawn > 0).sum()), inspected_px=int(drawn.size)
-    )
+    return Detection(mask=entered, method=DRAWN, crack_px=int(drawn.sum()), inspected_px=int(drawn.size))

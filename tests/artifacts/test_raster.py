@@ -1,12 +1,13 @@
 from contextlib import closing
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import tifffile
 
 from artifacts.page import page_key
-from artifacts.raster import MosaicRaster, TiffWindows, read_mask, write_mask
+from artifacts.raster import MosaicRaster, TiffWindows, read_drawn_mask, read_mask, write_mask
 from schemas.problem import BadInput
 
 RNG = np.random.default_rng(0)
@@ -60,3 +61,29 @@ def test_what_is_no_tiff_is_named(tmp_path: Path) -> None:
 
 def test_keys_hold_only_what_the_dashboard_takes() -> None:
     assert page_key("cracks", "Web_left (2).JPG") == "cracks-web-left-2-jpg"
+
+
+def lines(*levels: int) -> np.ndarray:
+    mask = np.zeros((200, 200), np.uint8)
+    for n, level in enumerate(levels):
+        cv2.line(mask, (10, 30 + 50 * n), (190, 10 + 60 * n), level, 7)
+    return mask
+
+
+@pytest.mark.parametrize("levels", [(1,), (255,), (1, 2, 200)])
+def test_a_drawn_mask_is_what_is_not_0(tmp_path: Path, levels: tuple[int, ...]) -> None:
+    cv2.imwrite(str(tmp_path / "m.png"), lines(*levels))
+    assert (read_drawn_mask(tmp_path / "m.png", "m.png") == (lines(*levels) > 0)).all()
+
+
+def test_a_mask_kept_as_jpeg_is_cut_half_way_up(tmp_path: Path) -> None:
+    """What rings beside it is no crack."""
+    cv2.imwrite(str(tmp_path / "m.jpg"), lines(255, 255), [cv2.IMWRITE_JPEG_QUALITY, 60])
+    read = read_drawn_mask(tmp_path / "m.jpg", "m.jpg")
+    assert (read != (lines(255, 255) > 0)).sum() < 0.02 * read.sum()
+
+
+def test_a_mask_that_is_black_on_white_is_refused(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "m.png"), np.uint8(255 * (np.arange(100) > 5)) * np.ones((100, 1), np.uint8))
+    with pytest.raises(BadInput, match=r"m.png: marks 94 % .*invert"):
+        read_drawn_mask(tmp_path / "m.png", "m.png")

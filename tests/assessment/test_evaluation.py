@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tasks.assessment.evaluation import count, evaluate, scores
+from tasks.assessment.evaluation import count, evaluate, scores, tally
 
 
 def line(x: int, thickness: int = 1) -> np.ndarray:
@@ -42,24 +42,24 @@ def test_nothing_found_and_nothing_there() -> None:
 
 def test_aggregate_weighs_pixels_and_mean_weighs_images() -> None:
     nothing = np.zeros((40, 40), dtype=bool)
-    exact, near, loose = evaluate("hairline", [(line(5, 9), line(5, 9)), (nothing, line(3))])
+    exact, near, loose = evaluate("hairline", [tally(line(5, 9), line(5, 9)), tally(nothing, line(3))])
     assert (exact.tolerance_px, near.tolerance_px, loose.tolerance_px, exact.images) == (0, 2, 5, 2)
     assert exact.aggregate.recall == pytest.approx(0.9) and exact.mean.recall == pytest.approx(0.5)
 
 
 def test_length_does_not_depend_on_how_wide_a_mask_is_drawn() -> None:
     """A rim of two pixels costs the area its precision, the centreline nothing."""
-    _, _, loose = evaluate("hairline", [(line(8, 8), line(10, 4))])
+    _, _, loose = evaluate("hairline", [tally(line(8, 8), line(10, 4))])
     assert loose.length.precision == loose.length.recall == 1.0
     wrong, truth = line(10), line(10) | line(30)
-    _, near, _ = evaluate("hairline", [(wrong, truth)])
+    _, near, _ = evaluate("hairline", [tally(wrong, truth)])
     assert (near.length.precision, near.length.recall) == (1.0, pytest.approx(0.5))
-    _, near, _ = evaluate("hairline", [(truth, wrong)])
+    _, near, _ = evaluate("hairline", [tally(truth, wrong)])
     assert near.false_length_per_mpx == pytest.approx(40 / 1600 * 1e6, rel=0.05)
 
 
 def test_the_interval_holds_the_figure_and_narrows_with_more_images() -> None:
-    pairs = [(line(5, 4), line(5, 4)), (line(5), line(20)), (line(7, 2), line(7, 4))]
+    pairs = [tally(line(5, 4), line(5, 4)), tally(line(5), line(20)), tally(line(7, 2), line(7, 4))]
     few, many = (evaluate("hairline", pairs * n)[0] for n in (2, 40))
     for one in (few, many):
         low, high = one.f1_interval

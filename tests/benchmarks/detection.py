@@ -20,7 +20,7 @@ import numpy.typing as npt
 from flows.console import out
 from flows.evaluate_command import ALL, as_table
 from schemas.settings import DetectSettings
-from tasks.assessment.evaluation import evaluate, near
+from tasks.assessment.evaluation import evaluate, near, tally
 from tasks.detection.components import components
 from tasks.detection.detect import detect_image
 from tasks.detection.network import OUR_LIMITS, Model, our_model
@@ -116,8 +116,7 @@ def on_photos(name: str) -> Iterator[Row]:
         return
     evaluations = []
     for method, find in finders().items():
-        pairs = ((find(rgb), truth) for rgb, truth in _of_set(name))
-        evaluations += evaluate(method, pairs)
+        evaluations += evaluate(method, [tally(find(rgb), truth) for rgb, truth in _of_set(name)])
     out.print(as_table(evaluations))
     best = {
         d: max(e.aggregate.f1 for e in evaluations if e.method not in ALL and e.tolerance_px == d)
@@ -161,13 +160,13 @@ def folds() -> Iterator[Row]:
     }
     found = {
         k: [
-            (detect_image(rgb, None, DetectSettings(), None, model=model).mask, truth)
+            tally(detect_image(rgb, None, DetectSettings(), None, model=model).mask, truth)
             for rgb, truth in _of_set(f"uav, fold {k}")
         ]
         for k, model in of_fold.items()
     }
-    every = evaluate("hairline", [pair for pairs in found.values() for pair in pairs])
-    of_each = {k: evaluate("hairline", pairs) for k, pairs in found.items()}
+    every = evaluate("hairline", [one for tallies in found.values() for one in tallies])
+    of_each = {k: evaluate("hairline", tallies) for k, tallies in found.items()}
     for at, one in enumerate(every):
         d = one.tolerance_px
         bar = {0: "≥ 0.65", 2: "≥ 0.8"}.get(d)

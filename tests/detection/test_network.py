@@ -49,6 +49,19 @@ def test_a_guest_finds_the_crack_that_it_can_see() -> None:
     assert found.scores and all(one.score >= settings.min_score for one in found.scores)
 
 
+@pytest.mark.parametrize(("width", "gsd_mm_px"), [(25, None), (45, None), (75, None), (5, 0.2)])
+def test_a_crack_through_a_small_image_is_found(width: int, gsd_mm_px: float | None) -> None:
+    """227 px, as published sets are cut: up to a third of it across, and no end of it to be seen; or all of
+    it shorter than the least length, 50 mm."""
+    rgb = rough(227, 227, contrast=0.01)
+    rgb[113 - width // 2 : 113 + (width + 1) // 2] //= 8
+    settings = DetectSettings(method="onnx", model="guest.onnx")
+    found = detect_image(rgb, None, settings, gsd_mm_px, model=GUEST).mask
+    assert abs(found.sum() / (227 * width) - 1) < 0.1
+    rgb[:, 120:] = 150  # ends within
+    assert detect_image(rgb, None, settings, gsd_mm_px, model=GUEST).mask.any() == (width < 30)
+
+
 @pytest.mark.parametrize(
     ("content", "what"),
     [
