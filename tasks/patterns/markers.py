@@ -21,6 +21,7 @@ SPREAD = 30.0  # a marker's pixels lie within this distance of its peak
 DARKEST = 25  # of 255, L: colours of darker pixels are noise
 LEAST_SHARE = 2e-4  # of the pixels, within a cell of the peak: fewer are no marker peak
 LEAST_PX = 100  # area of a marker
+LARGEST_SHARE = 0.05  # of the image: what is larger is no marker but a wall painted in two colours
 SOLID = 0.75  # least share of its convex hull that a marker fills; a runlet or a letter fills less
 
 Colours = npt.NDArray[np.int64]  # (64, 64) pixels by a, b
@@ -76,7 +77,7 @@ def compact_patches(mask: Mask, margin_px: int) -> Mask:
     kept = np.zeros(mask.shape, dtype=np.uint8)
     for label in range(1, count):
         x, y, width, height, area = (int(n) for n in stats[label])
-        if area < LEAST_PX:
+        if not LEAST_PX <= area <= max(LEAST_PX, LARGEST_SHARE * mask.size):
             continue
         patch = (labels[y : y + height, x : x + width] == label).astype(np.uint8)
         outline, _ = cv2.findContours(patch, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)

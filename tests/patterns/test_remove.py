@@ -57,6 +57,12 @@ def test_a_rust_run_is_not_hidden() -> None:
     assert remove(ArrayRaster(rgb), None, PatternSettings()).pattern_px == 0
 
 
+def test_a_wall_painted_in_two_colours_stays_whole() -> None:
+    rgb = surface((190, 180, 165))
+    rgb[: 2 * len(rgb) // 5] = surface((60, 110, 170))[: 2 * len(rgb) // 5]
+    assert not remove(ArrayRaster(rgb), None, PatternSettings()).masked.any()
+
+
 def test_what_no_photo_covers_and_what_is_off_the_surface_is_counted_apart() -> None:
     known = np.ones((400, 600), dtype=bool)
     known[:, :100] = False
