@@ -59,8 +59,8 @@ def measure_widths(offsets_px: Values, darkness: Profiles, psf_px: float) -> Wid
     best = apart.argmin(axis=1)
     rows = np.arange(len(darkness))
     wide = widths[best] >= WIDE_SIGMAS * psf_px
-    anchored = int(wide.sum()) >= min(ANCHORS, len(wide))
-    shared, spread = _shared_darkness(match, free[rows, best][wide] if anchored else None)
+    shared, spread, anchored = _shared_darkness(match, free[rows, best][wide])
+    wide &= anchored
     together = _residual(match, np.full_like(free, shared))
     width = np.where(wide, _refined(widths, apart), _refined(widths, together))
     noise = np.sqrt(apart[rows, best] / max(len(offsets_px) - 4, 1) * OVERSAMPLED)
@@ -102,18 +102,19 @@ def _residual(match: _Match, darkness: Values) -> Values:
     return np.asarray(np.maximum(squared, 1e-12))
 
 
-def _shared_darkness(match: _Match, of_wide: Values | None) -> tuple[float, float]:
-    """D of the whole crack and its standard deviation."""
-    if of_wide is not None:
-        middle = float(np.median(of_wide))
-        spread = 1.4826 * float(np.median(np.abs(of_wide - middle)))
-        return middle, max(spread / np.sqrt(len(of_wide) / OVERSAMPLED), 0.01)
+def _shared_darkness(match: _Match, of_wide: Values) -> tuple[float, float, bool]:
+    """D of the whole crack, its standard deviation, and whether wide profiles anchor it. They do where there
+    are enough and where the others agree: among many narrow profiles noise makes some look wide and pale."""
     tried = np.linspace(0.04, DARKEST, 97)
     errors = np.array([_residual(match, np.full_like(match.product, d)).min(axis=1).sum() for d in tried])
-    best = int(errors.argmin())
-    free = len(match.energy) / OVERSAMPLED
+    best, free = int(errors.argmin()), len(match.energy) / OVERSAMPLED
     within = tried[errors <= errors[best] * (1 + 4.0 / max(free, 4.0))]
-    return float(tried[best]), max(float(np.ptp(within)) / 4.0, 0.01)
+    if len(of_wide) >= min(ANCHORS, len(match.energy)):
+        middle = float(np.median(of_wide))
+        if within[0] <= middle <= within[-1]:
+            spread = 1.4826 * float(np.median(np.abs(of_wide - middle)))
+            return middle, max(spread / np.sqrt(len(of_wide) / OVERSAMPLED), 0.01), True
+    return float(tried[best]), max(float(np.ptp(within)) / 4.0, 0.01), False
 
 
 def _refined(widths: Values, errors: Values) -> Values:
