@@ -10,7 +10,7 @@ from tasks.measurement.measure import MeasuredCrack
 LINE_TOLERANCE_PX = 0.25  # of the polyline that is handed on
 SAMPLE_PX = 5.0  # between the width samples that are handed on
 WIDEST_QUANTILE = 0.95  # one chipped edge is no width
-SCALE_SIGMA = 0.005  # relative, of the ground sample distance: stand-off and focal length
+SCALE_SIGMA = 0.005  # relative, of the ground sample distance, be it ever so well told: relief and lens
 END_SIGMA_PX = 5.0  # how well the end of a crack that tapers to nothing can be placed, each end
 
 
@@ -34,20 +34,21 @@ def crack_of(measured: MeasuredCrack, crack_id: str, mosaic: Mosaic, photo: str 
     gsd = mosaic.gsd_mm_px
     if gsd is None:
         return crack
+    scale_sigma = float(np.hypot(SCALE_SIGMA, mosaic.scale_sigma or 0.0))
     length_mm = measured.length_px * gsd
     at = np.arange(0, len(width), max(1, round(SAMPLE_PX)))
     middle = np.array([measured.middle_px])
     scaled = {
         "length_mm": length_mm,
-        "length_sigma_mm": float(np.hypot(np.sqrt(2) * END_SIGMA_PX * gsd, SCALE_SIGMA * length_mm)),
+        "length_sigma_mm": float(np.hypot(np.sqrt(2) * END_SIGMA_PX * gsd, scale_sigma * length_mm)),
         "width_median_mm": median_px * gsd,
         "width_max_mm": widest_px * gsd,
-        "width_sigma_mm": float(np.hypot(np.median(sigma), SCALE_SIGMA * median_px)) * gsd,
+        "width_sigma_mm": float(np.hypot(np.median(sigma), scale_sigma * median_px)) * gsd,
         "widths": tuple(
             WidthSample(
                 s_mm=round(float(measured.along_px[n]) * gsd, 2),
                 width_mm=round(float(width[n]) * gsd, 4),
-                sigma_mm=round(float(sigma[n]) * gsd, 4),
+                sigma_mm=round(float(np.hypot(sigma[n], scale_sigma * width[n])) * gsd, 4),
             )
             for n in at
         ),

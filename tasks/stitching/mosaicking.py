@@ -24,6 +24,7 @@ from tasks.stitching.solution import Solved, neighbours, solve
 from tasks.stitching.view import Array
 
 NOTHING: Sightings = {}
+WRONG, DOUBTED = 1.5, 4.0  # a stated scale is in doubt from this factor and so many sigma of GPS's on
 PLACED_WORTH = 1e-3  # a photo placed by its pose alone fills only what no solved photo shows
 
 
@@ -89,6 +90,7 @@ def register_photos(
     gauge = fix_gauge(name, control, marks, usual_gsd, views) if control else None
     if gauge is None and frame.surface is None and settings.gsd_mm_px is not None:
         gauge = Gauge(settings.gsd_mm_px / 1000.0 / usual_gsd, 0.0, np.zeros(2), "stated GSD")
+    doubts = () if gauge is None else _contradicted(name, gauge, frame.scale_from, solved, usual_gsd)
     if gauge is not None:
         every, solved = [_moved(fate, gauge) for fate in every], _gauged(solved, gauge)
         marks, scale_from = placed_marks(sightings, solved.views), gauge.scale_from
@@ -109,8 +111,23 @@ def register_photos(
         scale_from,
         among,
         residuals,
-        left_out,
+        (*left_out, *doubts),
     )
+
+
+def _contradicted(
+    name: str, gauge: Gauge, known_from: str, solved: Solved, usual_gsd_m: float
+) -> tuple[LeftOut, ...]:
+    """A word where the scale that somebody stated is quite another than the one that GPS tells."""
+    sigma = solved.sigma_scale
+    if known_from != "GPS" or not np.isfinite(sigma):
+        return ()
+    if abs(np.log(gauge.scale)) < max(np.log(WRONG), DOUBTED * sigma):
+        return ()
+    told, stated = 1000.0 * usual_gsd_m, 1000.0 * gauge.scale * usual_gsd_m
+    what = f"its scale is {stated:.3g} mm/px by {gauge.scale_from}, {told:.3g} (± {100 * sigma:.2g} %) by GPS"
+    remedy = "One of them is wrong: every length and width hangs on it"
+    return (LeftOut(item=name, stage="stitch", what=what, remedy=remedy),)
 
 
 def blend_photos(

@@ -54,6 +54,19 @@ def test_a_crack_in_millimetres_and_in_the_world(own_store: Path) -> None:
         assert stage.pages is not None and stage.pages({"mosaic": mosaic}, result_of_stage)
 
 
+def test_what_is_not_known_of_the_scale_is_not_known_of_a_crack(own_store: Path) -> None:
+    """± 6 % of the scale, as GPS tells it."""
+    mosaic = mosaic_of(Store(own_store), drawn_crack(lambda x: 0 * x + 4.0).rgb, 0.5)
+    exact, vague = (
+        through(mosaic.model_copy(update={"scale_sigma": sigma}))[2].cracks[0] for sigma in (None, 0.06)
+    )
+    for crack, share in ((exact, 0.0), (vague, 0.06)):
+        assert crack.length_sigma_mm == pytest.approx(np.hypot(3.9, share * (crack.length_mm or 0)), rel=0.1)
+        assert (crack.width_sigma_mm or 0) > share * (crack.width_median_mm or 0)
+        assert all(one.sigma_mm > share * one.width_mm for one in crack.widths)
+    assert (exact.length_mm, exact.width_median_mm) == (vague.length_mm, vague.width_median_mm)
+
+
 def test_without_a_scale_only_pixels_are_said(own_store: Path) -> None:
     drawn = drawn_crack(lambda x: 0 * x + 4.0)
     _, found, result = through(

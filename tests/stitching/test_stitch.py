@@ -17,7 +17,7 @@ from schemas.problem import BadInput
 from schemas.settings import StitchSettings
 from tasks.stitching.task import pages
 from tests.stitching.conftest import CAMERA
-from tests.stitching.photo_sets import PhotoSet, errors_px, photo_set
+from tests.stitching.photo_sets import SETTINGS, PhotoSet, errors_px, photo_set
 from tests.stitching.scenes import WALL, Texture, concrete, plane_points, render
 
 
@@ -291,6 +291,15 @@ def test_photos_of_a_wall_need_no_more_than_gps_and_gimbal(wall: PhotoSet) -> No
     assert 0.005 < mosaic.scale_sigma < 0.1
     assert mosaic.gsd_mm_px == pytest.approx(2.0, rel=3 * mosaic.scale_sigma)
     assert np.sqrt(np.mean(errors_px(mosaic, wall.truth, gauge=True) ** 2)) < 0.15
+
+
+def test_a_stated_scale_that_gps_contradicts_is_said_to_be_in_doubt(wall: PhotoSet) -> None:
+    for gsd_mm_px, doubts in ((2.0, 0), (0.02, 1)):
+        settings = SETTINGS.model_copy(update={"gsd_mm_px": gsd_mm_px})
+        mosaic = located(wall, 0.1).stitch(None, settings)
+        assert (mosaic.scale_from, mosaic.gsd_mm_px) == ("stated GSD", pytest.approx(gsd_mm_px))
+        assert len(mosaic.left_out) == doubts
+    assert "0.02 mm/px by stated GSD, 2" in mosaic.left_out[0].what
 
 
 def test_gps_without_height_tells_no_place_on_a_wall(wall: PhotoSet) -> None:
