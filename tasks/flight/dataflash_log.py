@@ -38,8 +38,9 @@ def read_dataflash_log(path: Path) -> Recording:
             recording.add(Fix(time_s, message.Lat, message.Lng, message.Alt, height, yaw_deg))
         elif kind == exposures and _has_fix(message):
             height = getattr(message, "RelAlt", message.Alt - (home_m or message.Alt))
-            fix = Fix(time_s, message.Lat, message.Lng, message.Alt, height, message.Y % 360.0)
-            recording.triggers.append(Trigger(fix, message.P, getattr(message, "Img", None)))
+            pitch_deg, heading_deg = _attitude_deg(message)
+            fix = Fix(time_s, message.Lat, message.Lng, message.Alt, height, heading_deg % 360.0)
+            recording.triggers.append(Trigger(fix, pitch_deg, getattr(message, "Img", None)))
         elif kind == "MSG":
             if vehicle_name(recording.vehicle) is None:
                 recording.vehicle = vehicle_name(message.Message) or recording.vehicle
@@ -57,3 +58,10 @@ def read_dataflash_log(path: Path) -> Recording:
 
 def _has_fix(message: Any) -> bool:
     return (message.Lat, message.Lng) != (0.0, 0.0) and getattr(message, "Status", 3) >= 3
+
+
+def _attitude_deg(exposure: Any) -> tuple[float, float]:
+    """Pitch and yaw, whose columns are Pitch and Yaw in older firmware."""
+    if hasattr(exposure, "Yaw"):
+        return exposure.Pitch, exposure.Yaw
+    return exposure.P, exposure.Y
