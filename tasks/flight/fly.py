@@ -206,7 +206,7 @@ class Flight:
         elif kind == "COMMAND_ACK" and self._recorder is None and _armed(message):
             self._recorder = self._next_recorder
             self.reader.recording.fixes.clear()
-        read = self.reader.read(message)
+        read = self.reader.read(message, time.monotonic())
         if self._recorder is not None:
             time_ns = round(self.reader.clock_s * 1000) * 1_000_000
             self._recorder.frame(time_ns, bytes(message.get_msgbuf()))

@@ -16,43 +16,47 @@ READ = (  # message ids; a log's other messages need not be decoded
     mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED,
     mavlink.MAVLINK_MSG_ID_STATUSTEXT,
 )
+EXPOSURES = ("CAMERA_FEEDBACK", "CAMERA_IMAGE_CAPTURED")
 REBOOT_S = 5.0  # a clock this far back is a new boot
 
 
 class MessageReader:
-    """Reads the messages of one vehicle: the first autopilot that speaks."""
+    """Reads the messages of one vehicle: the first autopilot that speaks, and the cameras it carries."""
 
     def __init__(self, source: tuple[int, int] | None = None) -> None:
         """source: system and component id, where known already."""
         self.recording = Recording()
         self.source = source
-        self.clock_s = 0.0  # of the vehicle, kept monotone over reboots
+        self.clock_s = 0.0  # of the vehicle, running on over reboots as long as they took
         self.armed = False
         self.mode = 0
         self.mission_item = 0
         self._boot_s = 0.0
         self._last_s: float | None = None
+        self._heard_s = 0.0
         self._yaw_deg: float | None = None
-        self._trigger_type: str | None = None
+        self._shutter: tuple[str, int] | None = None  # type and component of the messages that tell exposures
 
-    def read(self, message: Any) -> Fix | Trigger | None:
-        """The fix or trigger that this message completes."""
+    def read(self, message: Any, heard_s: float) -> Fix | Trigger | None:
+        """The fix or trigger that this message completes. heard_s: when it came, by the listener's clock."""
         kind = message.get_type()
         speaker = (message.get_srcSystem(), message.get_srcComponent())
         if self.source is None and kind == "HEARTBEAT" and is_autopilot(message):
             self.source = speaker
-        if self.source != speaker:
+        if self.source is None or speaker[0] != self.source[0]:
             return None
-        if hasattr(message, "time_boot_ms"):
-            self._set_clock(message.time_boot_ms / 1000.0)
+        if speaker == self.source and hasattr(message, "time_boot_ms"):  # a camera's clock is another
+            self._set_clock(message.time_boot_ms / 1000.0, heard_s)
+        if kind in EXPOSURES:
+            return self._on_trigger((kind, speaker[1]), message)
+        if speaker != self.source:
+            return None
         if kind == "GLOBAL_POSITION_INT":
             return self._on_position(message)
         if kind == "ATTITUDE":
             self._yaw_deg = math.degrees(message.yaw) % 360.0
         elif kind == "HEARTBEAT":
             self._on_heartbeat(message)
-        elif kind in ("CAMERA_FEEDBACK", "CAMERA_IMAGE_CAPTURED"):
-            return self._on_trigger(kind, message)
         elif kind == "MISSION_CURRENT":
             self.mission_item = message.seq
         elif kind == "STATUSTEXT":
@@ -67,14 +71,16 @@ class MessageReader:
             self._end_of_flight()
         return self.recording
 
-    def _set_clock(self, boot_s: float) -> None:
+    def _set_clock(self, boot_s: float, heard_s: float) -> None:
         if self._last_s is not None and boot_s < self._last_s - REBOOT_S:
-            self._boot_s += self._last_s
-            self.armed = False
+            if self.armed:  # the link was lost before it disarmed
+                self._end_of_flight()
+                self.armed = False
+            self._boot_s = self.clock_s + max(0.0, heard_s - self._heard_s) - boot_s
         self.clock_s = self._boot_s + boot_s
         if self._last_s is None and self.armed:  # armed before the first time was told
             self.recording.armed_s[-1] = (self.clock_s, self.clock_s)
-        self._last_s = boot_s
+        self._last_s, self._heard_s = boot_s, heard_s
 
     def _on_position(self, message: Any) -> Fix | None:
         if message.lat == 0 and message.lon == 0:  # no position yet
@@ -107,11 +113,12 @@ class MessageReader:
         if self.recording.armed_s:
             self.recording.armed_s[-1] = (self.recording.armed_s[-1][0], self.clock_s)
 
-    def _on_trigger(self, kind: str, message: Any) -> Trigger | None:
-        if self._trigger_type not in (None, kind):  # the same exposure, told a second way
+    def _on_trigger(self, shutter: tuple[str, int], message: Any) -> Trigger | None:
+        if self._shutter not in (None, shutter):  # the same exposure, told a second way
             return None
-        self._trigger_type = kind
-        if kind == "CAMERA_FEEDBACK":
+        if getattr(message, "capture_result", 1) == 0:  # nothing was taken
+            return None
+        if shutter[0] == "CAMERA_FEEDBACK":
             longitude, altitude, height, index = (
                 message.lng,
                 message.alt_msl,
@@ -120,11 +127,12 @@ class MessageReader:
             )
             yaw, pitch = message.yaw, message.pitch
         else:
-            if message.capture_result == 0:
-                return None
             longitude, index = message.lon, message.image_index
             altitude, height = message.alt / 1000.0, message.relative_alt / 1000.0
             yaw, pitch = yaw_and_pitch_deg(message.q)
+        if message.lat == 0 and longitude == 0:  # a camera that does not know where it is
+            return None
+        self._shutter = shutter
         fix = Fix(self.clock_s, message.lat / 1e7, longitude / 1e7, altitude, height, yaw % 360.0)
         trigger = Trigger(fix, pitch, index)
         self.recording.triggers.append(trigger)

@@ -79,8 +79,8 @@ def read_frames(timed_frames: Iterator[tuple[int, bytes]], recorder: Recorder | 
         if recorder is not None:
             recorder.frame(time_ns, raw)
         message = decoder.decode(raw) if message_id(raw) in READ else None
-        read = reader.read(message) if message is not None else None
-        if recorder is not None and read is not None:
+        read = reader.read(message, time_ns / 1e9) if message is not None else None
+        if recorder is not None and read is not None and reader.recording.fixes:
             place = place or Place.of_log(reader.recording)
             archive(recorder, time_ns, read, place.world_pose)
     return reader.close()
