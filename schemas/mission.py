@@ -10,6 +10,7 @@ from schemas.problem import BadInput
 
 MOUNT_MODE_TARGETING = float(mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 MOST_ITEMS = 650  # ArduPilot answers MAV_MISSION_NO_SPACE to more
+GROUND_SPEED = float(mavlink.SPEED_TYPE_GROUNDSPEED)
 GIMBAL_RATE_DEG_S = 30.0  # slow end of what drone gimbals do
 
 
@@ -31,7 +32,7 @@ class MissionItem(Contract):
 
 
 def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
-    """The mission of a plan of one flight: home, take-off, each waypoint, landing at home.
+    """The mission of a plan of one flight: home, take-off, the speed, each waypoint, landing at home.
 
     Raises BadInput for a plan of several flights, and for more items than a vehicle takes.
 
@@ -68,6 +69,8 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
     add(mavlink.MAV_CMD_NAV_WAYPOINT, plan.home_m)  # item 0 is home by ArduPilot's convention
     here, yaw_deg, pitch_deg = _above_home(plan), 0.0, 0.0
     add(mavlink.MAV_CMD_NAV_TAKEOFF, here)
+    # Else the vehicle flies at its own WPNAV_SPEED, 10 m/s as delivered, which nothing was planned for.
+    add(mavlink.MAV_CMD_DO_CHANGE_SPEED, param1=GROUND_SPEED, param2=plan.vehicle.speed_m_s)
     facing = False  # whether a command on this leg already holds the nose at yaw_deg
     for waypoint in plan.waypoints:
         turn_s = abs((waypoint.yaw_deg - yaw_deg + 180.0) % 360.0 - 180.0) / plan.vehicle.yaw_rate_deg_s

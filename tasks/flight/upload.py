@@ -192,4 +192,6 @@ def compare(sent: tuple[MissionItem, ...], found: tuple[MissionItem, ...]) -> li
             differences.append(f"{what} is at {theirs.z:g} m instead of {mine.z:g} m")
         if abs((mine.param1 or 0.0) - (theirs.param1 or 0.0)) > 0.011:
             differences.append(f"{what} has parameter {theirs.param1} instead of {mine.param1}")
+        if not place and abs((mine.param2 or 0.0) - (theirs.param2 or 0.0)) > 0.011:
+            differences.append(f"{what} has parameter {theirs.param2} instead of {mine.param2}")
     return differences

@@ -3,7 +3,8 @@
 Commands run as ArduCopter runs them (AP_Mission): the DO and CONDITION items that follow a waypoint start
 when the vehicle leaves it, one after the other; CONDITION_YAW holds back those behind it until the nose is
 within 2°; what is still waiting when the next waypoint is reached is dropped. Without a commanded yaw the
-nose turns along the path. A mission that orders its items badly therefore takes bad photos here too.
+nose turns along the path, and without a commanded speed it flies at its own. A mission that orders its items
+badly therefore takes bad photos here too.
 
 Time is virtual: everything depends on the mission, the vehicle and the seed alone.
 """
@@ -28,6 +29,7 @@ STEP_S = 0.02  # of the simulation, also one turn of the autopilot's mission loo
 LAG_S = 0.12  # of each of the two first-order stages with which the vehicle follows its reference
 SHUTTER_DELAY_S = 0.05  # from the trigger to the exposure
 GIMBAL_RATE_DEG_S = 45.0
+OWN_SPEED_M_S = 10.0  # ArduCopter's WPNAV_SPEED as delivered
 YAW_REACHED_DEG = 2.0  # ArduCopter's verify_yaw
 TOUCHDOWN_S = 1.0  # from the ground contact to the motors' stop
 BIAS_S, JITTER_S = 60.0, 0.5  # memory of the slow position error, which walks over minutes, and of the quick
@@ -35,7 +37,12 @@ GUST_M, GUST_S = 0.02, 1.0  # the vehicle sees where gusts push it and steers ag
 COMPASS_DEG, NOSE_DEG, NOSE_S = 0.9, 0.3, 0.5  # unseen heading error (as slow as the bias) and seen swaying
 GIMBAL_DEG, GIMBAL_S = 0.3, 5.0  # unseen error of pitch and roll
 NAVIGATION = (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND)
-DO = (mavlink.MAV_CMD_CONDITION_YAW, mavlink.MAV_CMD_DO_MOUNT_CONTROL, mavlink.MAV_CMD_DO_DIGICAM_CONTROL)
+DO = (
+    mavlink.MAV_CMD_CONDITION_YAW,
+    mavlink.MAV_CMD_DO_CHANGE_SPEED,
+    mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+    mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+)
 
 
 @dataclass(frozen=True)
@@ -87,19 +94,25 @@ class _Axis:
 def fly_mission(
     items: tuple[MissionItem, ...], origin: GeoOrigin, home_m: Vector3, vehicle: Vehicle, seed: int
 ) -> Flown:
-    """Fly the mission: straight legs with a stop at each waypoint, limited speed, acceleration, yaw rate."""
+    """Fly the mission: straight legs with a stop at each waypoint, limited acceleration and yaw rate, at the
+    speed that the mission commands. Take-off climbs at the vehicle's."""
     yaw, pitch = _Axis(vehicle.yaw_rate_deg_s), _Axis(GIMBAL_RATE_DEG_S)
     position = np.asarray(home_m, dtype=float)
     reference = [position[None]]
     triggers: list[tuple[MissionItem, float]] = []
     reached: list[tuple[int, float]] = []
-    now = 0.0
+    now, speed_m_s = 0.0, OWN_SPEED_M_S
     for before, item in _legs(items):
+        for command in before:
+            if command.command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
+                speed_m_s = _single(command.param2)
+        climbs = item.command == mavlink.MAV_CMD_NAV_TAKEOFF
+        top_m_s = vehicle.speed_m_s if climbs else speed_m_s
         target = _target(item, position, origin, home_m)
         over = np.array([target[0], target[1], max(position[2], target[2])])
         landing = item.command == mavlink.MAV_CMD_NAV_LAND  # flies over the place, then comes down
         corners = [position, over, target] if landing else [position, target]
-        leg = np.vstack([_ramp(a, b, vehicle) for a, b in pairwise(corners)])
+        leg = np.vstack([_ramp(a, b, top_m_s, vehicle.acceleration_m_s2) for a, b in pairwise(corners)])
         hold_s = item.param1 or 0.0 if item.command == mavlink.MAV_CMD_NAV_WAYPOINT else 0.0
         if landing:
             hold_s = TOUCHDOWN_S
@@ -148,13 +161,13 @@ def _target(item: MissionItem, position: Array, origin: GeoOrigin, home_m: Vecto
     return np.array([east, north, home_m[2] + height])
 
 
-def _ramp(start: Array, end: Array, vehicle: Vehicle) -> Array:
+def _ramp(start: Array, end: Array, speed_m_s: float, acceleration_m_s2: float) -> Array:
     """(n, 3) positions every STEP_S of a straight leg: accelerate, cruise, brake. Excludes the start."""
     distance = float(np.linalg.norm(end - start))
     if distance < 1e-9:
         return np.empty((0, 3))
-    a = vehicle.acceleration_m_s2
-    ramp_s = min(vehicle.speed_m_s / a, np.sqrt(distance / a))
+    a = acceleration_m_s2
+    ramp_s = min(speed_m_s / a, np.sqrt(distance / a))
     top = a * ramp_s
     total_s = 2 * ramp_s + (distance - a * ramp_s**2) / top
     t = np.minimum(np.arange(1, int(np.ceil(total_s / STEP_S)) + 1) * STEP_S, total_s)

@@ -62,6 +62,20 @@ def test_a_plan_comes_back_item_by_item(write, read, name: str, tmp_path: Path) 
     assert back.home == pytest.approx(ORIGIN.to_geographic(plan.home_m), abs=1e-7)
 
 
+def test_every_mission_flies_at_the_planned_speed(tmp_path: Path) -> None:
+    """Commanded right after take-off: ArduPilot's own speed is 10 m/s."""
+    plan = a_plan().model_copy(update={"vehicle": Vehicle(speed_m_s=1.5)})
+    write_missions(plan, tmp_path / "mission")
+    for mission in (read_waypoints(tmp_path / "mission.waypoints"), read_plan(tmp_path / "mission.plan")):
+        take_off, speed = mission.items[:2]
+        assert (take_off.command, speed.command) == (22, 178)
+        assert (speed.param1, speed.param2) == (1.0, 1.5)  # over the ground, m/s
+    assert read_plan(tmp_path / "mission.plan").speed_m_s == 1.5
+    with ZipFile(tmp_path / "mission.kmz") as archive:
+        waylines = ElementTree.fromstring(archive.read("wpmz/waylines.wpml"))
+    assert waylines.findtext(".//w:autoFlightSpeed", "", WPML) == "1.5"
+
+
 WPML = {"k": "http://www.opengis.net/kml/2.2", "w": "http://www.dji.com/wpmz/1.0.2"}
 
 

@@ -81,6 +81,16 @@ def test_keeps_its_limits(speed: float, acceleration: float, yaw_rate: float, se
     assert turned.max() < yaw_rate + 6 * 0.3 / 0.5
 
 
+def test_without_a_commanded_speed_it_flies_at_its_own() -> None:
+    """As ArduCopter: its own 10 m/s leave acceleration alone to hold it back on the 6 m to the wall."""
+    plan = wall_plan(vehicle=exact(speed_m_s=2.0, acceleration_m_s2=2.5))
+    slow, careless = flown(plan), tuple(i for i in mission_items(plan) if i.command != 178)
+    fast = flown(plan, items=careless)
+    top_m_s = [np.linalg.norm(np.diff(f.estimated_m, axis=0), axis=1).max() / STEP_S for f in (slow, fast)]
+    assert top_m_s[0] < 2.0 + 6 * GUST_M
+    assert top_m_s[1] > 3.5
+
+
 def test_holds_before_the_shutter() -> None:
     plan = wall_plan(vehicle=exact(hold_s=2.0))
     f = flown(plan)
