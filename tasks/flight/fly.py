@@ -1,5 +1,6 @@
 """Fly a mission on ArduCopter: prepare on the ground, arm, AUTO, follow until it has landed and disarmed."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -33,7 +34,7 @@ RATES_HZ = {
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
 }
-FROM_HOME_M = 20.0  # farther from the planned home, the way to the first waypoint was never checked
+LEAST_OFF_M = 0.1  # nobody places a vehicle better
 ARM_RETRY_S = 2.0
 START_S = 20.0  # from an accepted start to a vehicle that says it is armed
 AIRBORNE_M = 0.5
@@ -54,6 +55,9 @@ class Flight:
         self.link, self.plan, self.items = link, plan, items
         self.place = Place.of_plan(plan)
         self.reader = MessageReader()
+        # Around the climb from home the plan keeps everything away by the vehicle's radius, its position
+        # error and the clearance: a vehicle no farther off than the clearance meets nothing.
+        self.off_home_m = max(plan.vehicle.clearance_m, LEAST_OFF_M)
         self.warnings: list[str] = []  # what the vehicle said is wrong
         self._recorder: Recorder | None = None
         self._next_recorder: Recorder | None = None
@@ -107,12 +111,13 @@ class Flight:
                 "Wait until it has a GPS position, then fly the plan again",
             )
         x, y, _ = self.place.world_m(fixes[-1])
-        east, north = x - self.plan.home_m[0], y - self.plan.home_m[1]
-        if (east**2 + north**2) ** 0.5 > FROM_HOME_M:
+        off_m = math.hypot(x - self.plan.home_m[0], y - self.plan.home_m[1])
+        if off_m > self.off_home_m:
             latitude, longitude, altitude = self.plan.origin.to_geographic(self.plan.home_m)
             raise BadInput(
                 self.link.url,
-                f"the vehicle stands {(east**2 + north**2) ** 0.5:.0f} m from the plan's home",
+                f"the vehicle stands {off_m:.1f} m from the plan's home, and no farther than"
+                f" {self.off_home_m:g} m from it is the way up known to be free",
                 f"Carry it to {latitude:.7f}, {longitude:.7f}, or plan again with another home_m or origin"
                 f" (start ArduPilot's simulator with --home {latitude:.7f},{longitude:.7f},{altitude:.0f},0)",
             )
@@ -127,6 +132,7 @@ class Flight:
         """
         try:
             self._arm(recorder)
+            self._check_height()
             self._start()
         except LinkLost:
             raise FlightLost(self.reader.close()) from None
@@ -162,6 +168,21 @@ class Flight:
     def _set_mode(self, mode: int) -> bool:
         custom = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         return bool(self.link.command(mavlink.MAV_CMD_DO_SET_MODE, custom, mode) == ACCEPTED)
+
+    def _check_height(self) -> None:
+        """On arming an ArduCopter sets its home where it stands, unless somebody has set another."""
+        told = self.link.expect(("GLOBAL_POSITION_INT",), self.link.timeout_s)
+        if told is None:
+            raise self._problem("the vehicle does not tell its height")
+        height_m = told.relative_alt / 1000.0
+        if abs(height_m) > self.off_home_m:
+            raise BadInput(
+                self.link.url,
+                f"on the ground the vehicle counts its height as {height_m:.1f} m: its whole flight would be"
+                f" off by as much, and {self.off_home_m:g} m are allowed",
+                "Restart it at the plan's home, or set its home there, then fly the plan again",
+            )
+        self.reader.recording.fixes.clear()  # those of before the flight
 
     def _start(self) -> None:
         if not self._set_mode(AUTO):

@@ -35,6 +35,7 @@ class Faults:
     refuse_arm: bool = False
     settling: int = 0  # so often it refuses to leave its mode: its position is not good enough yet
     lose_last_item: bool = False  # of an uploaded mission
+    home_off_m: float = 0.0  # its own home, from which it counts heights, lies as far above the ground
     vanish_s: float | None = None  # the link ends at this time of the flight
 
 
@@ -100,6 +101,9 @@ class Autopilot:
         self.heartbeat()
         if self.expected:
             self._ask()
+        self._stand()
+
+    def _stand(self) -> None:
         self._position(0.0, self.home_m, 0.0, (0.0, 0.0, 0.0))
 
     def _say(self, text: str, severity: int = mavlink.MAV_SEVERITY_INFO) -> None:
@@ -191,6 +195,8 @@ class Autopilot:
         elif message.command != mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             result = mavlink.MAV_RESULT_UNSUPPORTED
         self.send(self.mav.command_ack_encode(message.command, result))
+        if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and self.armed:
+            self._stand()
         if message.command == mavlink.MAV_CMD_MISSION_START and result == accepted:
             self.mode = AUTO
             self._fly()
@@ -300,7 +306,7 @@ class Autopilot:
                 round(latitude * 1e7),
                 round(longitude * 1e7),
                 round(altitude * 1000),
-                round(up * 1000),
+                round((up - self.faults.home_off_m) * 1000),
                 round(vn * 100),
                 round(ve * 100),
                 round(-vu * 100),

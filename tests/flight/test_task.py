@@ -6,13 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from artifacts import store
 from artifacts.flight_log import MAVLINK, ORIGINAL, messages
 from schemas.flight_log import FlightLog
-from schemas.geodesy import GeoOrigin
+from schemas.flight_plan import FlightPlan
 from schemas.mission import mission_items
 from schemas.problem import BadInput
+from tasks.flight.fly import Flight
 from tasks.flight.link import Link
 from tasks.flight.task import convert, fly, import_log
 from tasks.flight.upload import read_back
@@ -65,7 +67,7 @@ def test_the_archive_gives_the_flight_back(log: FlightLog) -> None:
 def test_a_truncated_archive_gives_what_it_has(log: FlightLog, tmp_path: Path) -> None:
     whole = store.current().path(log.archive).read_bytes()
     cut = tmp_path / "cut.mcap"
-    cut.write_bytes(whole[: int(len(whole) * 0.6)])
+    cut.write_bytes(whole[: int(len(whole) * 0.65)])
     part = import_log.bare(store.current().put(cut), "cut.mcap", PLAN)
     assert 0.4 * log.duration_s < part.duration_s < 0.75 * log.duration_s
     *before, last = part.shots  # the speed at the last rests on less of the track
@@ -114,10 +116,41 @@ def test_a_silent_vehicle_is_named() -> None:
         assert problem.value.item == url
 
 
-def test_a_vehicle_far_from_home_does_not_arm(vehicle: str) -> None:
-    elsewhere = PLAN.model_copy(update={"origin": GeoOrigin(latitude_deg=-35.36, longitude_deg=149.165230)})
-    with pytest.raises(BadInput, match="362 m from the plan's home"):
-        fly.bare(elsewhere, "1", vehicle, 5.0)
+def moved(north_m: float) -> FlightPlan:
+    """The plan with home so far south of where the vehicle stands; the vehicle keeps a clearance of 1 m."""
+    latitude = PLAN.origin.latitude_deg - north_m / 110_946
+    return PLAN.model_copy(update={"origin": PLAN.origin.model_copy(update={"latitude_deg": latitude})})
+
+
+@pytest.mark.parametrize(("north_m", "told"), [(1.2, "1.2"), (15.0, "15.0"), (-362.0, "362.0")])
+def test_a_vehicle_farther_from_home_than_the_clearance_does_not_arm(
+    vehicle: str, north_m: float, told: str
+) -> None:
+    with pytest.raises(BadInput, match=rf"stands {told} m from the plan's home.* 1 m .*Carry it to -35\.36"):
+        fly.bare(moved(north_m), "1", vehicle, 5.0)
+
+
+def test_a_vehicle_within_the_clearance_of_home_may_fly(vehicle: str) -> None:
+    near = moved(0.9)
+    with Link(vehicle, 5.0) as link:
+        assert Flight(link, near, mission_items(near)).prepare().startswith("ArduCopter")
+
+
+@pytest.mark.parametrize("home_off_m", [1.2, -8.0])
+def test_a_vehicle_that_counts_heights_from_elsewhere_does_not_take_off(home_off_m: float) -> None:
+    off = rf"counts its height as {-home_off_m} m.*and 1 m are allowed"
+    with start_vehicle(PLAN, 1, Faults(home_off_m=home_off_m)) as url:
+        with pytest.raises(BadInput, match=off):
+            fly.bare(PLAN, "1", url, 5.0)
+        with Link(url, 5.0) as link:
+            heartbeat = link.find_vehicle()
+            assert not heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+            assert read_back(link) == ()
+
+
+def test_heights_told_within_the_clearance_are_flown() -> None:
+    with start_vehicle(PLAN, 1, Faults(home_off_m=0.5)) as url:
+        assert fly.bare(PLAN, "1", url, 5.0).shots
 
 
 # -- logs of others ------------------------------------------------------------------------------------------
