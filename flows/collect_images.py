@@ -7,6 +7,7 @@ from pathlib import Path
 from prefect import flow
 
 from artifacts import store
+from flows.battery_change import wait_for_battery
 from flows.external_flight import photos_and_logs
 from flows.inspection_file import existing
 from flows.model_structure import has_scans, model
@@ -121,23 +122,24 @@ def collect(
 
 
 def _flown(inspection: Inspection, planned: FlightPlan) -> FlightLog:
-    """Each flight of the plan in turn; batteries are changed between them."""
+    """Each flight of the plan in turn. A vehicle flies one of them a run, since its battery is changed then;
+    a rehearsal flies all."""
+    if inspection.flight == "vehicle" and inspection.connection is None:
+        raise BadInput("connection", "missing for 'flight: vehicle'", "Give it, as udpin:0.0.0.0:14550")
     legs = planned.each_flight
-    if inspection.flight == "vehicle":
-        if inspection.connection is None:
-            raise BadInput("connection", "missing for 'flight: vehicle'", "Give it, as udpin:0.0.0.0:14550")
-        return joined(
-            [fly(leg, _mission(inspection, n), inspection.connection, 30.0) for n, leg in enumerate(legs)]
-        )
-    if run.current().dry or all(
-        fly.is_cached(leg, _mission(inspection, n), "", 30.0) for n, leg in enumerate(legs)
-    ):
+    flown = [fly.is_cached(leg, _mission(inspection, n), "", 30.0) for n, leg in enumerate(legs)]
+    if run.current().dry or all(flown):
         return joined([fly(leg, _mission(inspection, n), "", 30.0) for n, leg in enumerate(legs)])
     seed = inspection.simulation.seed if inspection.simulation else 1
     logs = []
     for n, leg in enumerate(legs):
-        with start_vehicle(leg, seed + n) as connection:
-            logs.append(fly(leg, _mission(inspection, n), connection, 30.0))
+        if inspection.flight == "vehicle" and inspection.connection is not None:
+            logs.append(fly(leg, _mission(inspection, n), inspection.connection, 30.0))
+            if not flown[n] and n + 1 < len(legs):
+                wait_for_battery(n + 1, len(legs))
+        else:
+            with start_vehicle(leg, seed + n) as connection:
+                logs.append(fly(leg, _mission(inspection, n), connection, 30.0))
     return joined(logs)
 
 

@@ -54,7 +54,7 @@ def run(
 ) -> int:
     """Run an inspection: every stage that its inputs allow, finished ones from the cache.
 
-    Exit codes: 0 finished, 2 unusable input, 3 waiting for an external flight.
+    Exit codes: 0 finished, 2 unusable input, 3 waiting for an external flight or a vehicle's next battery.
 
     Parameters
     ----------

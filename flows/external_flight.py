@@ -35,10 +35,15 @@ def photos_and_logs(inspection: Inspection, base: Path) -> tuple[tuple[PhotoSet,
         return inspection.photos, [log for name in named for log in _logs(base, name, "flight_log")]
     if run.current().dry:
         raise NotYetKnown("fly")
-    context = FlowRunContext.get()
-    if context is None or context.flow_run is None or context.flow_run.deployment_id is None:
+    if not deployed():
         raise WaitingForFlight
     return _asked_for(base)
+
+
+def deployed() -> bool:
+    """Whether this run is a deployment's, which the dashboard can have wait and go on."""
+    context = FlowRunContext.get()
+    return context is not None and context.flow_run is not None and context.flow_run.deployment_id is not None
 
 
 def _logs(base: Path, name: str, key: str) -> list[Path]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import httpx
 
+from flows.command_line import EXIT_WAITING_FOR_FLIGHT
 from flows.console import StageLines, out
 from schemas.crack_report import CrackReport
 
@@ -73,6 +74,7 @@ def run_flow(
 def run_inspection(
     inspection: str, folder: Path | None, redo: tuple[str, ...], photos: Path | None, logs: tuple[Path, ...]
 ) -> int:
+    from flows.battery_change import WaitingForBattery
     from flows.external_flight import WaitingForFlight
     from flows.inspection_file import read_inspection
 
@@ -84,7 +86,12 @@ def run_inspection(
     except WaitingForFlight:
         out.print(f"The plan is ready: {where / 'plan'}. Fly it, then:")
         out.print(f"  hairline run {inspection} --photos DIR --log FILE [FILE …]", markup=False)
-        return 3
+        return EXIT_WAITING_FOR_FLIGHT
+    except WaitingForBattery as waiting:
+        out.print(f"{waiting} Change the battery, stand clear, then run again:")
+        out.print(f"  hairline run {inspection}", markup=False)
+        out.print(f"The vehicle takes off at once then, with battery {waiting.flown + 1}.")
+        return EXIT_WAITING_FOR_FLIGHT
     say_results(report, where)
     return 0
 
