@@ -9,45 +9,25 @@ from prefect import flow
 from artifacts import store
 from flows.battery_change import wait_for_battery
 from flows.external_flight import photos_and_logs
-from flows.inspection_file import existing
+from flows.given_photos import PhotoSource, given_photos, position_sigma_m
 from flows.model_structure import has_scans, model
 from flows.opening import opened
 from flows.workers import one_a_core
-from schemas.camera import Camera, CameraPose
-from schemas.contract import Vector3
-from schemas.file import File
 from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
 from schemas.geodesy import GeoOrigin
-from schemas.inspection import Inspection, PhotoSet, SimulationInput
+from schemas.inspection import Inspection, SimulationInput
 from schemas.problem import BadInput, LeftOut
 from schemas.structure import Structure
 from schemas.surface import Surface
 from tasks import run
 from tasks.flight.task import fly, import_log
-from tasks.photos.task import assign
 from tasks.planning.task import plan_flight
 from tasks.simulation.task import photograph, photograph_wall, start_vehicle
 
 # Where a plan is anchored when the inspection gives no origin: the home of ArduPilot's own simulator, so
 # that the mission can be rehearsed there but nobody takes it for a real place.
 REHEARSAL_ORIGIN = GeoOrigin(latitude_deg=-35.363262, longitude_deg=149.165237, altitude_m=584.0)
-PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif"}
-
-
-@dataclass(frozen=True)
-class PhotoSource:
-    """A photo file and what is known of it before it is opened."""
-
-    file: File
-    name: str
-    surface: str
-    stitch: bool = True
-    gsd_mm_px: float | None = None
-    camera: Camera | None = None
-    pose: CameraPose | None = None
-    position_sigma_m: float = 5.0
-    velocity_m_s: Vector3 | None = None
 
 
 @dataclass(frozen=True)
@@ -106,7 +86,7 @@ def collect(
     if planned is not None:
         save_plan(planned)
     if inspection.flight is None or planned is None:
-        return Collected(planned, photos=tuple(_given_photos(inspection, base, None)), surfaces=surfaces)
+        return Collected(planned, photos=tuple(given_photos(inspection, base, None)), surfaces=surfaces)
     if inspection.flight == "external":
         photo_sets, paths = photos_and_logs(inspection, base)
         inspection = inspection.model_copy(update={"photos": photo_sets})
@@ -115,9 +95,7 @@ def collect(
     else:
         log = _flown(inspection, planned)
     simulated = inspection.simulation is not None and inspection.flight == "simulated"
-    photos = (
-        _simulated_photos(inspection, planned, log) if simulated else _given_photos(inspection, base, log)
-    )
+    photos = _simulated_photos(inspection, planned, log) if simulated else given_photos(inspection, base, log)
     return Collected(planned, log, tuple(photos), _missed(log), surfaces)
 
 
@@ -173,7 +151,7 @@ def _simulated_photos(inspection: Inspection, planned: FlightPlan, log: FlightLo
             surface=surface,
             camera=planned.camera,
             pose=shot.pose if shot else None,
-            position_sigma_m=_position_sigma_m(inspection),
+            position_sigma_m=position_sigma_m(inspection),
             velocity_m_s=shot.velocity_m_s if shot else None,
         )
         for surface, folder in zip(surfaces, folders, strict=True)
@@ -199,58 +177,6 @@ def _simulated_wall(simulation: SimulationInput) -> Collected:
         for entry in taken.photos.entries
     )
     return Collected(photos=photos, surfaces=(taken.surface,))
-
-
-def _position_sigma_m(inspection: Inspection) -> float:
-    return float((inspection.vehicle.position_bias_m**2 + inspection.vehicle.position_jitter_m**2) ** 0.5)
-
-
-def _given_photos(inspection: Inspection, base: Path, log: FlightLog | None) -> list[PhotoSource]:
-    """The photos in the inspection's folders; those of a logged flight with their surface and pose."""
-    camera = inspection.camera.camera() if inspection.camera else None
-    sources = []
-    for photo_set in inspection.photos:
-        folder = existing(base, photo_set.folder, "photos")
-        paths = (
-            sorted(p for p in folder.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES)
-            if folder.is_dir()
-            else []
-        )
-        if not paths:
-            raise BadInput(
-                photo_set.folder, "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there"
-            )
-        shots = {}
-        if log is not None and photo_set.surface is None:
-            shots = {a.name: a.shot for a in assign(tuple(p.name for p in paths), log)}
-        for path in paths:
-            shot = shots.get(path.name)
-            sources.append(
-                PhotoSource(
-                    file=store.current().put(path),
-                    name=path.name,
-                    surface=(shot.surface if shot else None) or photo_set.surface or folder.resolve().name,
-                    stitch=photo_set.stitch,
-                    gsd_mm_px=_stated_gsd_mm_px(photo_set, camera),
-                    camera=camera,
-                    pose=shot.pose if shot else None,
-                    position_sigma_m=_position_sigma_m(inspection) if shot else 5.0,
-                    velocity_m_s=shot.velocity_m_s if shot else None,
-                )
-            )
-    return sources
-
-
-def _stated_gsd_mm_px(photo_set: PhotoSet, camera: Camera | None) -> float | None:
-    if photo_set.gsd_mm_px is not None or photo_set.stand_off_m is None:
-        return photo_set.gsd_mm_px
-    if camera is None:
-        raise BadInput(
-            photo_set.folder,
-            "stand_off_m needs a camera",
-            "Give the key 'camera' its size and lens, or gsd_mm_px",
-        )
-    return camera.gsd_mm_px(photo_set.stand_off_m)
 
 
 @flow(name="collect-images", description=__doc__, persist_result=False, task_runner=one_a_core())

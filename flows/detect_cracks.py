@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 from prefect import flow
 
 from artifacts import store
-from flows.collect_images import PhotoSource, collect
+from flows.collect_images import collect
+from flows.given_photos import PhotoSource
 from flows.inspection_file import existing
 from flows.model_structure import Modelled, has_scans, model
 from flows.opening import opened

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from flows.collect_images import PHOTO_SUFFIXES
+from flows.given_photos import PHOTO_SUFFIXES
 from schemas import settings
 from schemas.inspection import Inspection
 from schemas.problem import BadInput

@@ -93,7 +93,7 @@ def one_by_one(
 
 
 def photos_in(path: Path) -> list[Path]:
-    from flows.collect_images import PHOTO_SUFFIXES
+    from flows.given_photos import PHOTO_SUFFIXES
 
     if path.is_file():
         return [path]

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from artifacts.mission_files import write_missions
-from artifacts.run_folder import lay_out
+from artifacts.run_folder import lay_out, safe_name
 from schemas.detection import Detection, Patterns
 from schemas.evaluation import Curves, Evaluation
 from schemas.file import Folder
@@ -122,9 +122,9 @@ def lay_out_flight(folder: Path, log: FlightLog | None) -> None:
 
 
 def lay_out_mosaic(folder: Path, mosaic: Mosaic, patterns: Patterns, detection: Detection) -> None:
-    write_mosaic(folder / "mosaics" / mosaic.name, mosaic)
+    write_mosaic(folder / "mosaics" / safe_name(mosaic.name), mosaic)
     lay_out(
-        folder / "detection" / mosaic.name,
+        folder / "detection" / safe_name(mosaic.name),
         {"cracks.png": detection.mask, "not_inspected.png": patterns.mask},
         copy=False,
     )

@@ -133,7 +133,7 @@ class Session:
 
 def _photos(folder: Path) -> list[Path]:
     """By the time of writing, then by name: as the camera took them."""
-    from flows.collect_images import PHOTO_SUFFIXES
+    from flows.given_photos import PHOTO_SUFFIXES
 
     try:
         found = [

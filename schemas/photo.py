@@ -12,7 +12,7 @@ LOST = 0.5  # share of a photo that is clipped: real photos of structures have a
 
 
 class Photo(Contract):
-    name: str  # the file's name, unique in its set
+    name: str  # the file's name, with its folder's before it where several of the set are called so
     file: File  # 8-bit and upright: as it came, or a PNG of it where orientation or pixel format were others
     camera: Camera  # from the inspection, or from EXIF; of the upright image
     camera_from: str = "inspection"  # what the focal length rests on, in words where it is a guess
@@ -52,6 +52,6 @@ class Features(Contract):
     angle float32 (N,), response float32 (N,), descriptors uint8 (N, 128): RootSIFT times 512); the strongest
     of each part of the photo first."""
 
-    photo: str
+    photo: str  # its name
     file: File
     count: int

@@ -34,12 +34,12 @@ def unusable(photos: Sequence[Photo], min_sharpness: float | None) -> dict[int, 
     """Photos that are not even matched, and why: blurred, clipped, or the same file twice."""
     reasons: dict[int, str] = {}
     shares = sharpness_shares(photos)
-    first: dict[str, str] = {}
+    first: dict[str, int] = {}
     for i, photo in enumerate(photos):
-        twin = first.setdefault(photo.file.sha256, photo.name)
+        twin = first.setdefault(photo.file.sha256, i)
         blurred = shares[i] < BLURRED if min_sharpness is None else photo.sharpness < min_sharpness
-        if twin != photo.name:
-            reasons[i] = f"the same picture as {twin}"
+        if twin != i:
+            reasons[i] = f"the same picture as {photos[twin].name}"
         elif photo.misexposed:
             reasons[i] = photo.misexposed
         elif blurred and photo.exposure > 0.0:

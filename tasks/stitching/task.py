@@ -1,7 +1,8 @@
 """Stages: stitch the photos of a surface; let a photo stand for itself."""
 
-from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -81,14 +82,16 @@ def stitch(
     control: Control | None = None,
     relief: Relief | None = None,
 ) -> Mosaic:
-    """One mosaic of all photos of a surface; every photo is solved, placed or rejected with a reason."""
+    """One mosaic of all photos of a surface; every photo is solved, placed or rejected with a reason.
+
+    features: of each photo, in their order."""
     from tasks.stitching.mosaicking import blend_photos, register_photos
 
     if not photos:
         raise BadInput(name, "has no photo", "Give it photos, or leave it out")
-    described = {f.photo: f for f in features}
-    ordered = sorted(photos, key=lambda p: p.name)
-    found = [_features(described[p.name]) for p in ordered]
+    described = sorted(zip(photos, features, strict=True), key=lambda pair: pair[0].name)
+    ordered = [photo for photo, _ in described]
+    found = [_features(of_photo) for _, of_photo in described]
     read = _reader(ordered)
     sightings, not_there = _sightings(control, ordered, read) if control else ({}, ())
     registered = register_photos(
@@ -189,14 +192,14 @@ def _sightings(
     """Where the photos show the marks, as stated and as tags are found; stated photos that are not there."""
     from tasks.stitching.tags import find_tags
 
-    number = {photo.name: i for i, photo in enumerate(photos)}
+    number = _numbers([photo.name for photo in photos])
     stated = [(m, photo, pixel) for m, seen in control.marks.items() for photo, pixel in seen.items()]
     missing = tuple(
         LeftOut(
             item=f"mark {mark}",
             stage="stitching",
             what=f"there is no readable photo {photo} in this set",
-            remedy="Correct the photo's name, with its suffix",
+            remedy="Correct the photo's name: with its suffix, and its folder where several are called so",
         )
         for mark, photo, _ in stated
         if photo not in number
@@ -210,6 +213,14 @@ def _sightings(
             for mark, centre in find_tags(read(i), control.tags).items():
                 sightings.setdefault(mark, {}).setdefault(i, centre)
     return sightings, missing
+
+
+def _numbers(names: Sequence[str]) -> dict[str, int]:
+    """Of each photo by its name, and by its file's name alone where one photo of these is called so."""
+    files = [PurePath(name).name for name in names]
+    bearers = Counter(files)
+    alone = {file: i for i, file in enumerate(files) if bearers[file] == 1}
+    return alone | {name: i for i, name in enumerate(names)}
 
 
 def _reader(photos: list[Photo]) -> Callable[[int], "Pixels"]:

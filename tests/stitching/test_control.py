@@ -170,3 +170,20 @@ def test_a_tags_centre_is_found_to_a_tenth_of_a_pixel() -> None:
     assert list(found) == ["7"]
     assert found["7"] == pytest.approx(centre[:2] / centre[2], abs=0.1)
     assert find_tags(cv2.cvtColor(twice, cv2.COLOR_GRAY2RGB), "APRILTAG_36H11") == {}
+
+
+def test_marks_name_a_photo_by_its_file_where_no_other_is_called_so(wall: PhotoSet, surveyed: Mosaic) -> None:
+    """The photos lie in two folders; one name is in both, and needs its folder to be told."""
+    bare = without_poses(wall)
+    folders = tuple(
+        p.model_copy(update={"name": f"card{1 + k % 2}/{p.name}"}) for k, p in enumerate(bare.photos)
+    )
+    twice = folders[0].model_copy(update={"name": f"card2/{bare.photos[0].name}"})
+    photos = PhotoSet((*folders, twice), (*bare.features, bare.features[0]), bare.truth)
+    seen = sightings(wall)
+    targets = tuple(PlaneTarget(mark=m, uv_m=PLACES[m]) for m in CORNERS)
+    mosaic = controlled(photos, Control(marks=seen, targets=targets))
+    assert mosaic.scale_from == "targets"
+    assert mosaic.gsd_mm_px == pytest.approx(surveyed.gsd_mm_px, rel=0.002)
+    unclear = {left.what for left in mosaic.left_out if left.item.startswith("mark ")}
+    assert unclear == {f"there is no readable photo {bare.photos[0].name} in this set"}

@@ -148,6 +148,26 @@ def test_order_of_photos_changes_no_byte(wall: PhotoSet, mosaic: Mosaic) -> None
     assert turned.stitch(WALL).model_dump() == mosaic.model_dump()
 
 
+def test_two_cards_with_the_same_file_names_are_one_set(wall: PhotoSet, mosaic: Mosaic) -> None:
+    """Six photos of each card, called alike by both: each is matched by its own features, and shown once."""
+    names = [f"DJI_{k % 6 + 1:04d}.JPG" for k in range(12)]
+    photos = tuple(p.model_copy(update={"name": n}) for p, n in zip(wall.photos, names, strict=True))
+    described = tuple(f.model_copy(update={"photo": n}) for f, n in zip(wall.features, names, strict=True))
+    truth = {p.file.sha256: wall.truth[p.name] for p in wall.photos}
+    both = PhotoSet(photos, described, truth).stitch(WALL)
+    assert set(status(both).values()) == {"solved"}
+    by_file = both.model_copy(
+        update={"photos": tuple(p.model_copy(update={"name": p.file.sha256}) for p in both.photos)}
+    )
+    assert np.sqrt(np.mean(errors_px(by_file, truth, gauge=True) ** 2)) < 0.15
+    assert both.covered_m2 == pytest.approx(mosaic.covered_m2, rel=0.01)
+
+
+def test_same_picture_on_two_cards_counts_once(wall: PhotoSet) -> None:
+    both = PhotoSet((*wall.photos, wall.photos[0]), (*wall.features, wall.features[0]), wall.truth)
+    assert sum(p.status == "rejected" for p in both.stitch(WALL).placements) == 1
+
+
 def test_number_of_threads_changes_no_byte(wall: PhotoSet, mosaic: Mosaic) -> None:
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)

@@ -1,0 +1,97 @@
+"""The photos in an inspection's folders, and what is known of each before it is opened."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from artifacts import store
+from flows.inspection_file import existing
+from schemas.camera import Camera, CameraPose
+from schemas.contract import Vector3
+from schemas.file import File
+from schemas.flight_log import FlightLog
+from schemas.inspection import Inspection, PhotoSet
+from schemas.problem import BadInput
+from tasks.photos.task import assign
+
+PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif"}
+
+
+@dataclass(frozen=True)
+class PhotoSource:
+    """A photo file and what is known of it before it is opened."""
+
+    file: File
+    name: str
+    surface: str
+    stitch: bool = True
+    gsd_mm_px: float | None = None
+    camera: Camera | None = None
+    pose: CameraPose | None = None
+    position_sigma_m: float = 5.0
+    velocity_m_s: Vector3 | None = None
+
+
+def given_photos(inspection: Inspection, base: Path, log: FlightLog | None) -> list[PhotoSource]:
+    """The photos in the inspection's folders; those of a logged flight with their surface and pose.
+
+    A photo is called by its file's name; where several folders have one of that name, by folder/name."""
+    camera = inspection.camera.camera() if inspection.camera else None
+    folders = [existing(base, photo_set.folder, "photos").resolve() for photo_set in inspection.photos]
+    paths = [_photos_in(folder, s.folder) for folder, s in zip(folders, inspection.photos, strict=True)]
+    bearers = Counter(path.name for of_folder in paths for path in of_folder)
+    sources = []
+    for photo_set, label, of_folder in zip(inspection.photos, _labels(folders), paths, strict=True):
+        shots = {}
+        if log is not None and photo_set.surface is None:
+            shots = {a.name: a.shot for a in assign(tuple(p.name for p in of_folder), log)}
+        for path in of_folder:
+            shot = shots.get(path.name)
+            sources.append(
+                PhotoSource(
+                    file=store.current().put(path),
+                    name=path.name if bearers[path.name] == 1 else f"{label}/{path.name}",
+                    surface=(shot.surface if shot else None) or photo_set.surface or path.parent.name,
+                    stitch=photo_set.stitch,
+                    gsd_mm_px=_stated_gsd_mm_px(photo_set, camera),
+                    camera=camera,
+                    pose=shot.pose if shot else None,
+                    position_sigma_m=position_sigma_m(inspection) if shot else 5.0,
+                    velocity_m_s=shot.velocity_m_s if shot else None,
+                )
+            )
+    return sources
+
+
+def position_sigma_m(inspection: Inspection) -> float:
+    return float((inspection.vehicle.position_bias_m**2 + inspection.vehicle.position_jitter_m**2) ** 0.5)
+
+
+def _photos_in(folder: Path, stated: str) -> list[Path]:
+    photos = folder.iterdir() if folder.is_dir() else ()
+    paths = sorted(p for p in photos if p.suffix.lower() in PHOTO_SUFFIXES)
+    if not paths:
+        raise BadInput(stated, "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
+    return paths
+
+
+def _labels(folders: Sequence[Path]) -> list[str]:
+    """The last parts of each folder's path: as many as tell the folders apart."""
+    parts, labels = 1, [folder.name for folder in folders]
+    while len(set(labels)) < len(set(folders)):
+        parts += 1
+        labels = ["/".join(folder.parts[-parts:]) for folder in folders]
+    return labels
+
+
+def _stated_gsd_mm_px(photo_set: PhotoSet, camera: Camera | None) -> float | None:
+    if photo_set.gsd_mm_px is not None or photo_set.stand_off_m is None:
+        return photo_set.gsd_mm_px
+    if camera is None:
+        raise BadInput(
+            photo_set.folder,
+            "stand_off_m needs a camera",
+            "Give the key 'camera' its size and lens, or gsd_mm_px",
+        )
+    return camera.gsd_mm_px(photo_set.stand_off_m)

@@ -1,0 +1,49 @@
+"""The photos in an inspection's folders: what they are called, and which shot of a flight took each."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from artifacts import store
+from flows.given_photos import PhotoSource, given_photos
+from schemas.inspection import Inspection, PhotoSet
+
+
+@pytest.fixture(autouse=True)
+def own_store() -> object:
+    with store.temporary():
+        yield
+
+
+def photo(path: Path, grey: int) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.full((40, 60, 3), grey, np.uint8)).save(path)
+
+
+def given(base: Path, *sets: PhotoSet) -> list[PhotoSource]:
+    return given_photos(Inspection(name="two-cards", photos=sets), base, None)
+
+
+def test_photos_of_two_cards_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    for k, name in enumerate(["card1/DJI_0001.png", "card1/DJI_0002.png", "card2/DJI_0001.png"]):
+        photo(tmp_path / name, 60 * k)
+    sources = given(
+        tmp_path, PhotoSet(folder="card1", surface="deck"), PhotoSet(folder="card2", surface="deck")
+    )
+    assert [s.name for s in sources] == ["card1/DJI_0001.png", "DJI_0002.png", "card2/DJI_0001.png"]
+    assert {s.surface for s in sources} == {"deck"}
+    assert len({s.file.sha256 for s in sources}) == 3
+
+
+def test_folders_called_alike_are_told_apart_by_the_folders_around_them(tmp_path: Path) -> None:
+    for k, name in enumerate(["flight1/100MEDIA/1.png", "flight2/100MEDIA/1.png"]):
+        photo(tmp_path / name, 60 * k)
+    sources = given(tmp_path, PhotoSet(folder="flight1/100MEDIA"), PhotoSet(folder="flight2/100MEDIA"))
+    assert [s.name for s in sources] == ["flight1/100MEDIA/1.png", "flight2/100MEDIA/1.png"]
+
+
+def test_one_folder_needs_no_name(tmp_path: Path) -> None:
+    photo(tmp_path / "photos/1.png", 60)
+    assert [s.name for s in given(tmp_path, PhotoSet(folder="photos"))] == ["1.png"]
