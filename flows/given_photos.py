@@ -9,7 +9,7 @@ from artifacts import store
 from flows.inspection_file import existing
 from schemas.camera import Camera, CameraPose
 from schemas.contract import Vector3
-from schemas.file import File
+from schemas.file import File, FolderEntry
 from schemas.flight_log import FlightLog
 from schemas.inspection import Inspection, PhotoSet
 from schemas.problem import BadInput
@@ -41,26 +41,29 @@ def given_photos(inspection: Inspection, base: Path, log: FlightLog | None) -> l
     folders = [existing(base, photo_set.folder, "photos").resolve() for photo_set in inspection.photos]
     paths = [_photos_in(folder, s.folder) for folder, s in zip(folders, inspection.photos, strict=True)]
     bearers = Counter(path.name for of_folder in paths for path in of_folder)
+    found = [
+        (photo_set, f"{label}/{path.name}", path, store.current().put(path))
+        for photo_set, label, of_folder in zip(inspection.photos, _labels(folders), paths, strict=True)
+        for path in of_folder
+    ]
+    flown = [FolderEntry(name=name, file=file) for s, name, _, file in found if s.surface is None]
+    shots = {a.name: a.shot for a in assign(tuple(flown), log)} if log is not None and flown else {}
     sources = []
-    for photo_set, label, of_folder in zip(inspection.photos, _labels(folders), paths, strict=True):
-        shots = {}
-        if log is not None and photo_set.surface is None:
-            shots = {a.name: a.shot for a in assign(tuple(p.name for p in of_folder), log)}
-        for path in of_folder:
-            shot = shots.get(path.name)
-            sources.append(
-                PhotoSource(
-                    file=store.current().put(path),
-                    name=path.name if bearers[path.name] == 1 else f"{label}/{path.name}",
-                    surface=(shot.surface if shot else None) or photo_set.surface or path.parent.name,
-                    stitch=photo_set.stitch,
-                    gsd_mm_px=_stated_gsd_mm_px(photo_set, camera),
-                    camera=camera,
-                    pose=shot.pose if shot else None,
-                    position_sigma_m=position_sigma_m(inspection) if shot else 5.0,
-                    velocity_m_s=shot.velocity_m_s if shot else None,
-                )
+    for photo_set, name, path, file in found:
+        shot = shots.get(name) if photo_set.surface is None else None
+        sources.append(
+            PhotoSource(
+                file=file,
+                name=path.name if bearers[path.name] == 1 else name,
+                surface=(shot.surface if shot else None) or photo_set.surface or path.parent.name,
+                stitch=photo_set.stitch,
+                gsd_mm_px=_stated_gsd_mm_px(photo_set, camera),
+                camera=camera,
+                pose=shot.pose if shot else None,
+                position_sigma_m=position_sigma_m(inspection) if shot else 5.0,
+                velocity_m_s=shot.velocity_m_s if shot else None,
             )
+        )
     return sources
 
 

@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
+from datetime import datetime
 
 from PIL import Image
 
@@ -10,6 +11,7 @@ from schemas.contract import Vector3
 
 _EXIF_IFD, _GPS_IFD = 0x8769, 0x8825
 _EXPOSURE_S, _ISO, _F_NUMBER = 0x829A, 0x8827, 0x829D
+_TAKEN, _TAKEN_FRACTION = 0x9003, 0x9291  # DateTimeOriginal, SubSecTimeOriginal
 _FOCAL_MM, _FOCAL_35MM, _PLANE_X_RESOLUTION, _PLANE_UNIT = 0x920A, 0xA405, 0xA20E, 0xA210
 _MM_PER_UNIT = {2: 25.4, 3: 10.0, 4: 1.0}
 
@@ -43,6 +45,17 @@ def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
         velocity_m_s=_velocity(xmp),
         metered_ev=_metered_ev(camera),
     )
+
+
+def taken_s(exif: Image.Exif) -> float | None:
+    """Seconds since 1970 by the camera's own clock, whatever its time zone; None where it is not stated."""
+    camera = _ifd(exif, _EXIF_IFD)
+    try:
+        taken = datetime.strptime(str(camera.get(_TAKEN)).strip("\x00 "), "%Y:%m:%d %H:%M:%S")
+    except ValueError:
+        return None
+    fraction = re.match(r"\d+", str(camera.get(_TAKEN_FRACTION)))
+    return (taken - datetime(1970, 1, 1)).total_seconds() + (float(f"0.{fraction[0]}") if fraction else 0.0)
 
 
 def _metered_ev(camera: dict[int, object]) -> float | None:

@@ -1,6 +1,8 @@
 """Decode a photo of any common kind into 8-bit upright RGB, or say by name why it cannot be."""
 
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,20 +38,34 @@ class Decoded:
 
 def read_photo(path: Path, name: str) -> Decoded:
     """Raises BadInput: not an image, truncated, too small, too large, or of no photographic kind."""
+    with _opened(path, name) as image:
+        _check_size(image, name)
+        exif = image.getexif()
+        xmp = image.info.get("xmp", b"")
+        image.load()
+        orientation = _orientation(exif)
+        pixels = _rgb(_upright(image, orientation), name)
+        # MPO: a JPEG with a second picture inside, as DJI writes
+        known = image.format in ("JPEG", "MPO", "PNG") and image.mode in ("RGB", "L")
+        plain = known and orientation == 1
+    return Decoded(pixels, orientation, plain, exif, xmp if isinstance(xmp, bytes) else xmp.encode())
+
+
+def read_exif(path: Path, name: str) -> Image.Exif:
+    """Without decoding the pixels. Raises BadInput: not an image, or damaged."""
+    with _opened(path, name) as image:
+        return image.getexif()
+
+
+@contextmanager
+def _opened(path: Path, name: str) -> Iterator[Image.Image]:
+    """What Pillow raises, here or while the image is used, becomes BadInput."""
     if path.stat().st_size == 0:
         raise BadInput(name, "the file is empty (0 bytes)", REMEDY)
     formats = FORMATS if _is_heic(path) and _heic_is_readable(name) else FORMATS[:-1]
     try:
         with Image.open(path, formats=formats) as image:
-            _check_size(image, name)
-            exif = image.getexif()
-            xmp = image.info.get("xmp", b"")
-            image.load()
-            orientation = _orientation(exif)
-            pixels = _rgb(_upright(image, orientation), name)
-            # MPO: a JPEG with a second picture inside, as DJI writes
-            known = image.format in ("JPEG", "MPO", "PNG") and image.mode in ("RGB", "L")
-            plain = known and orientation == 1
+            yield image
     except BadInput:
         raise
     except UnidentifiedImageError:
@@ -58,7 +74,6 @@ def read_photo(path: Path, name: str) -> Decoded:
         raise BadInput(name, "has more pixels than a photo can have", REMEDY) from None
     except _DAMAGE as error:
         raise BadInput(name, f"is damaged ({error})", "Copy it again from the camera's card") from None
-    return Decoded(pixels, orientation, plain, exif, xmp if isinstance(xmp, bytes) else xmp.encode())
 
 
 def _is_heic(path: Path) -> bool:

@@ -15,7 +15,7 @@ from schemas.assigned_shot import AssignedShot
 from schemas.calibration import Calibration
 from schemas.camera import Camera, CameraPose
 from schemas.contract import Vector3
-from schemas.file import File
+from schemas.file import File, FolderEntry
 from schemas.flight_log import FlightLog
 from schemas.flight_plan import FlightPlan
 from schemas.photo import Features, Photo
@@ -79,11 +79,22 @@ def ingest(
 
 
 @stage()
-def assign(names: tuple[str, ...], log: FlightLog) -> tuple[AssignedShot, ...]:
-    """Which photo of a folder is which shot of the flight log."""
+def assign(photos: tuple[FolderEntry, ...], log: FlightLog) -> tuple[AssignedShot, ...]:
+    """Which photo of all folders of a flight is which shot of its log."""
     from tasks.photos.assignment import assign_shots
 
-    return assign_shots(names, log)
+    return assign_shots({photo.name: _taken_s(photo) for photo in photos}, log)
+
+
+def _taken_s(photo: FolderEntry) -> float | None:
+    """None where the photo does not tell, as one that is damaged: `ingest` names it."""
+    from tasks.photos.metadata import taken_s
+    from tasks.photos.reading import read_exif
+
+    try:
+        return taken_s(read_exif(store.current().path(photo.file), photo.name))
+    except BadInput:
+        return None
 
 
 @stage()

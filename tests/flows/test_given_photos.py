@@ -8,7 +8,9 @@ from PIL import Image
 
 from artifacts import store
 from flows.given_photos import PhotoSource, given_photos
+from schemas.flight_log import FlightLog
 from schemas.inspection import Inspection, PhotoSet
+from tests.photos.test_assignment import log_of
 
 
 @pytest.fixture(autouse=True)
@@ -17,13 +19,16 @@ def own_store() -> object:
         yield
 
 
-def photo(path: Path, grey: int) -> None:
+def photo(path: Path, grey: int, taken: str | None = None) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(np.full((40, 60, 3), grey, np.uint8)).save(path)
+    exif = Image.Exif()
+    if taken is not None:
+        exif.get_ifd(0x8769)[0x9003] = taken
+    Image.fromarray(np.full((40, 60, 3), grey, np.uint8)).save(path, exif=exif)
 
 
-def given(base: Path, *sets: PhotoSet) -> list[PhotoSource]:
-    return given_photos(Inspection(name="two-cards", photos=sets), base, None)
+def given(base: Path, *sets: PhotoSet, log: FlightLog | None = None) -> list[PhotoSource]:
+    return given_photos(Inspection(name="two-cards", photos=sets), base, log)
 
 
 def test_photos_of_two_cards_are_told_apart_by_their_folders(tmp_path: Path) -> None:
@@ -47,3 +52,14 @@ def test_folders_called_alike_are_told_apart_by_the_folders_around_them(tmp_path
 def test_one_folder_needs_no_name(tmp_path: Path) -> None:
     photo(tmp_path / "photos/1.png", 60)
     assert [s.name for s in given(tmp_path, PhotoSet(folder="photos"))] == ["1.png"]
+
+
+def test_a_flight_on_two_cards_is_one_flight_in_the_order_of_the_clock(tmp_path: Path) -> None:
+    """The camera's counter starts anew on the second card, whose name comes first."""
+    for k, name in enumerate(["b/DJI_9998.jpg", "b/DJI_9999.jpg", "a/DJI_0001.jpg", "a/DJI_9998.jpg"]):
+        photo(tmp_path / name, 60 * k, f"2026:05:01 12:00:0{k}")
+    log = log_of(("w", 1), ("x", 2), ("y", 3), ("z", 4))
+    sources = given(tmp_path, PhotoSet(folder="a"), PhotoSet(folder="b"), log=log)
+    east_m = {s.name: s.pose.position_m[0] for s in sources if s.pose}
+    assert east_m == {"b/DJI_9998.jpg": 1, "DJI_9999.jpg": 2, "DJI_0001.jpg": 3, "a/DJI_9998.jpg": 4}
+    assert {s.surface for s in sources} == {"wall"}

@@ -5,7 +5,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import IFDRational
 
 from tasks.photos.intrinsics import camera_from_metadata
-from tasks.photos.metadata import Metadata, read_metadata
+from tasks.photos.metadata import Metadata, read_metadata, taken_s
 from tasks.photos.reading import read_photo
 from tests.development_data import development_data
 
@@ -54,6 +54,21 @@ def test_speed_of_a_dji_photo_is_east_north_up() -> None:
 )
 def test_exposure_is_told_by_all_three_or_not_at_all(camera: dict[int, object], ev: float | None) -> None:
     assert read_metadata(exif_with({}, camera), b"").metered_ev == pytest.approx(ev, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("camera", "taken"),
+    [
+        ({0x9003: "1970:01:02 00:00:01", 0x9291: "25"}, 86401.25),
+        ({0x9003: "1970:01:02 00:00:01\x00"}, 86401.0),
+        ({0x9003: "1970:01:02 00:00:01", 0x9291: "  "}, 86401.0),
+        ({0x9003: "0000:00:00 00:00:00"}, None),
+        ({0x9003: b"noon"}, None),
+        ({}, None),
+    ],
+)
+def test_when_a_photo_was_taken(camera: dict[int, object], taken: float | None) -> None:
+    assert taken_s(exif_with({}, camera)) == taken
 
 
 def test_a_gimbal_rolled_over_looks_where_it_looks() -> None:
