@@ -15,7 +15,7 @@ from schemas.inspection import Inspection, PhotoSet
 from schemas.problem import BadInput
 from tasks.photos.task import assign
 
-PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif"}
+PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".heic", ".heif"}
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def stitch(
     Parameters
     ----------
     folder:
-        Photos: JPEG, PNG, TIFF, HEIC. Focal length, GPS and gimbal angles are read from EXIF where present.
+        Photos: JPEG, PNG, BMP, TIFF, HEIC. Focal length, GPS and gimbal angles are read where stated.
     out:
         Folder to write to.
     gsd_mm_px:
@@ -112,7 +112,7 @@ def detect(
     Parameters
     ----------
     images:
-        An image or a folder of images: JPEG, PNG, TIFF.
+        An image or a folder of images: JPEG, PNG, BMP, TIFF.
     out:
         Folder to write to.
     method:
@@ -208,7 +208,7 @@ def measure(image: Path, mask: Path, *, out: OutFolder, gsd_mm_px: float | None 
     Parameters
     ----------
     image:
-        JPEG, PNG or TIFF.
+        JPEG, PNG, BMP or TIFF.
     mask:
         Image of the same size, not 0 where there is a crack.
     out:

@@ -76,7 +76,7 @@ def _of_one_size(
         except BadInput as problem:
             left_out.append(LeftOut.because("photos", problem))
     if not readable:
-        raise BadInput("photos", "none can be read", "Give JPEG, PNG or TIFF photos of a board")
+        raise BadInput("photos", "none can be read", "Give JPEG, PNG, BMP or TIFF photos of a board")
     common, _ = Counter(size for *_, size in readable).most_common(1)[0]
     left_out += [
         _left_out(name, f"is {w} × {h} px, the others {common[0]} × {common[1]} px", "One camera at a time")

@@ -14,10 +14,10 @@ from schemas.problem import BadInput
 
 Pixels = npt.NDArray[np.uint8]
 
-FORMATS = ("JPEG", "PNG", "TIFF", "HEIF")
+FORMATS = ("JPEG", "PNG", "BMP", "TIFF", "HEIF")
 SMALLEST_PX = 32  # per side; less is an icon, not a photo
 LARGEST_PX = 32_000  # per side; OpenCV's remap fails from 32,767
-REMEDY = "Give a JPEG, PNG, TIFF or HEIC photo, or take this file out of the folder"
+REMEDY = "Give a JPEG, PNG, BMP, TIFF or HEIC photo, or take this file out of the folder"
 HEIC_BRANDS = (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")  # ISO 23008-12, at byte 8
 
 Image.MAX_IMAGE_PIXELS = 600_000_000  # Pillow's own limit refuses cameras of more than 179 MP

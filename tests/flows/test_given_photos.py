@@ -63,3 +63,8 @@ def test_a_flight_on_two_cards_is_one_flight_in_the_order_of_the_clock(tmp_path:
     east_m = {s.name: s.pose.position_m[0] for s in sources if s.pose}
     assert east_m == {"b/DJI_9998.jpg": 1, "DJI_9999.jpg": 2, "DJI_0001.jpg": 3, "a/DJI_9998.jpg": 4}
     assert {s.surface for s in sources} == {"wall"}
+
+
+def test_bitmaps_are_photos_too(tmp_path: Path) -> None:
+    photo(tmp_path / "photos/1.BMP", 60)
+    assert [s.name for s in given(tmp_path, PhotoSet(folder="photos"))] == ["1.BMP"]

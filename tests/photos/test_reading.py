@@ -26,13 +26,13 @@ def gradient(width: int = 96, height: int = 64) -> np.ndarray:
     return rgb
 
 
-@pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
+@pytest.mark.parametrize("suffix", ["jpg", "png", "bmp", "tif"])
 def test_common_formats_give_the_same_pixels(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"photo.{suffix}"
     Image.fromarray(gradient()).save(path, quality=98)
     decoded = read_photo(path, path.name)
     assert np.abs(decoded.pixels.astype(int) - gradient()).max() <= (6 if suffix == "jpg" else 0)
-    assert decoded.as_it_came == (suffix != "tif")
+    assert decoded.as_it_came == (suffix in ("jpg", "png"))
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
@@ -66,13 +66,15 @@ def test_odd_pixel_formats_are_read_right(tmp_path: Path) -> None:
     Image.fromarray(grey.astype(np.uint16) * 257).save(tmp_path / "deep.png")
     Image.fromarray(grey.astype(np.uint16) * 257).save(tmp_path / "deep.tif")
     Image.fromarray(grey.astype(np.float32) / 255).save(tmp_path / "float.tif")
-    Image.fromarray(rgb).quantize(256).save(tmp_path / "palette.png")
+    for name in ("palette.png", "palette.bmp"):
+        Image.fromarray(rgb).quantize(256).save(tmp_path / name)
     expected = np.repeat(grey[..., None], 3, axis=2)
     for name in ("grey.png", "deep.png", "deep.tif"):
         np.testing.assert_array_equal(read_photo(tmp_path / name, name).pixels, expected)
     assert np.abs(read_photo(tmp_path / "float.tif", "f").pixels.astype(int) - expected).max() <= 4
     np.testing.assert_array_equal(read_photo(tmp_path / "alpha.png", "a").pixels, rgb)
-    assert np.abs(read_photo(tmp_path / "palette.png", "p").pixels.astype(int) - rgb).mean() < 6
+    for name in ("palette.png", "palette.bmp"):
+        assert np.abs(read_photo(tmp_path / name, name).pixels.astype(int) - rgb).mean() < 6
 
 
 def test_cmyk_is_converted(tmp_path: Path) -> None:
@@ -156,7 +158,7 @@ def test_one_pixel_is_no_photo(tmp_path: Path) -> None:
         read_photo(tmp_path / "dot.png", "dot.png")
 
 
-@pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
+@pytest.mark.parametrize("suffix", ["jpg", "png", "bmp", "tif"])
 @settings(max_examples=25)
 @given(share=st.floats(0.02, 0.9), seed=st.integers(0, 10_000))
 def test_a_truncated_or_scrambled_file_never_gets_out_as_another_error(
