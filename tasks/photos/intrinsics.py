@@ -65,22 +65,31 @@ def camera_from_metadata(width_px: int, height_px: int, metadata: Metadata) -> t
     In order: DJI's calibration, focal length with the sensor's resolution, the 35-mm equivalent (by the
     diagonal, CIPA DCG-001; images wider than 3:2 are taken for crops of a 4:3 sensor), else a guess."""
     longer = max(width_px, height_px)
+    resized = _resized(width_px, height_px, metadata)
+    calibrated_px = (metadata.calibrated_focal_px or 0.0) * resized
+    by_sensor_px = (metadata.focal_mm or 0.0) * (metadata.px_per_mm or 0.0) * resized
     focal_px, source, sigma = (
         1.2 * longer,
         "assumed: no focal length in the photo, 1.2 × its longer side",
         0.3,
     )
-    if metadata.calibrated_focal_px and 0.2 < metadata.calibrated_focal_px / longer < 50:
-        focal_px, source, sigma = metadata.calibrated_focal_px, "XMP calibrated focal length", 0.02
-    elif (
-        metadata.focal_mm
-        and metadata.px_per_mm
-        and 0.2 < metadata.focal_mm * metadata.px_per_mm / longer < 50
-    ):
-        focal_px, source, sigma = metadata.focal_mm * metadata.px_per_mm, "EXIF focal length and sensor", 0.03
+    if 0.2 < calibrated_px / longer < 50:
+        focal_px, source, sigma = calibrated_px, "XMP calibrated focal length", 0.02
+    elif 0.2 < by_sensor_px / longer < 50:
+        focal_px, source, sigma = by_sensor_px, "EXIF focal length and sensor", 0.03
     elif metadata.focal_35mm:
         aspect = longer / min(width_px, height_px)
         diagonal = math.hypot(1.0, 0.75) if aspect > 1.55 else math.hypot(1.0, 1.0 / aspect)
         focal_px = metadata.focal_35mm / _FULL_FRAME_DIAGONAL_MM * diagonal * longer
         source, sigma = "EXIF 35-mm equivalent focal length, no distortion assumed", 0.05
     return Camera(width_px=width_px, height_px=height_px, focal_px=focal_px), source, sigma
+
+
+def _resized(width_px: int, height_px: int, metadata: Metadata) -> float:
+    """How many pixels of the photo one of the camera's became, by the size that EXIF states: software that
+    shrinks a photo often leaves EXIF as it was. 1 for a photo of another shape: it was cut, or EXIF errs."""
+    if metadata.size_px is None:
+        return 1.0
+    (shorter, longer), (own_shorter, own_longer) = sorted(metadata.size_px), sorted((width_px, height_px))
+    scale = own_longer / longer
+    return scale if abs(shorter * scale - own_shorter) <= 1.0 else 1.0

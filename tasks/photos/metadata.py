@@ -7,12 +7,13 @@ from datetime import datetime
 
 from PIL import Image
 
-from schemas.contract import Vector3
+from schemas.contract import Vector2, Vector3
 
 _EXIF_IFD, _GPS_IFD = 0x8769, 0x8825
 _EXPOSURE_S, _ISO, _F_NUMBER = 0x829A, 0x8827, 0x829D
 _TAKEN, _TAKEN_FRACTION = 0x9003, 0x9291  # DateTimeOriginal, SubSecTimeOriginal
 _FOCAL_MM, _FOCAL_35MM, _PLANE_X_RESOLUTION, _PLANE_UNIT = 0x920A, 0xA405, 0xA20E, 0xA210
+_WIDTH, _HEIGHT = 0xA002, 0xA003  # PixelXDimension, PixelYDimension
 _MM_PER_UNIT = {2: 25.4, 3: 10.0, 4: 1.0}
 
 
@@ -26,6 +27,7 @@ class Metadata:
     view_deg: Vector3 | None  # yaw, pitch, roll of the gimbal
     velocity_m_s: Vector3 | None = None  # east, north, up
     metered_ev: float | None = None  # log2 of exposure time (s) · ISO / 100 / f-number²
+    size_px: Vector2 | None = None  # width and height that px_per_mm and calibrated_focal_px are of
 
 
 def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
@@ -44,7 +46,13 @@ def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
         view_deg=None if yaw is None or pitch is None else _view(yaw, pitch, roll or 0.0),
         velocity_m_s=_velocity(xmp),
         metered_ev=_metered_ev(camera),
+        size_px=_size_px(camera),
     )
+
+
+def _size_px(camera: dict[int, object]) -> Vector2 | None:
+    width, height = _positive(camera.get(_WIDTH)), _positive(camera.get(_HEIGHT))
+    return None if width is None or height is None else (width, height)
 
 
 def taken_s(exif: Image.Exif) -> float | None:

@@ -110,6 +110,27 @@ def test_focal_length_by_the_best_evidence(found: Metadata, focal_px: float, sou
     assert 0 < sigma <= 0.3
 
 
+@pytest.mark.parametrize(
+    ("size_px", "stated_px", "focal_px"),
+    [
+        ((1368, 912), (5472, 3648), 912.0),  # a quarter of what EXIF says
+        ((912, 1368), (5472, 3648), 912.0),  # and set upright
+        ((1500, 1000), (5472, 3648), 1000.0),
+        ((5472, 3648), (5472, 3648), 3648.0),
+        ((2736, 3648), (5472, 3648), 3648.0),  # cut, not shrunk
+    ],
+)
+@pytest.mark.parametrize("calibrated", [None, 3648.0])
+def test_a_shrunk_photo_has_a_shorter_focal_length(
+    calibrated: float | None, size_px: tuple[int, int], stated_px: tuple[int, int], focal_px: float
+) -> None:
+    """DJI FC6310, whose EXIF and XMP came through the shrinking as they were."""
+    exif = exif_with({}, {0x920A: 8.8, 0xA20E: 414.5, 0xA210: 4, 0xA002: stated_px[0], 0xA003: stated_px[1]})
+    xmp = b"" if calibrated is None else b'drone-dji:CalibratedFocalLength="3648.0"'
+    camera, _, _ = camera_from_metadata(*size_px, read_metadata(exif, xmp))
+    assert camera.focal_px == pytest.approx(focal_px, rel=1e-3)
+
+
 def test_wide_photos_are_crops_of_a_4_3_sensor() -> None:
     """DJI FC300S at 16:9: 3.61 mm, pixels of 1.56 µm: 2311 px."""
     found = Metadata(3.61, 20.0, None, None, None, None)
