@@ -17,6 +17,7 @@ TILT_DEG = 2.0  # gimbal and compass
 COMPASS_DEG = 10.0
 SPREAD_SIGMAS = 2.0  # of the positions' error: from here on positions tell the yaw
 UNKNOWN = np.full(3, np.nan)
+DOWN_DEG = 40.0  # below the horizon: between walls, seen within 30° of squarely, and ground, seen at 45° too
 GUESSED_TILT_DEG = 8.0  # nobody said where the camera looked: at the surface, roughly
 
 
@@ -105,8 +106,8 @@ def _velocity(photo: Photo, R_world_plane: Array) -> Array:
 
 
 def _looks_down(poses: Sequence[CameraPose]) -> bool:
-    """Most photos look more down than ahead: at the ground, not at a wall or from below at a deck."""
-    return bool(np.median([pose.R_world_camera[2, 2] for pose in poses]) < -np.sqrt(0.5))
+    """Most photos look well down: at the ground, not at a wall or from below at a deck."""
+    return bool(np.median([pose.R_world_camera[2, 2] for pose in poses]) < -np.sin(np.radians(DOWN_DEG)))
 
 
 def _posed(photos: Sequence[Photo], located: Sequence[Photo]) -> list[Photo]:
