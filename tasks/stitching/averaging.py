@@ -31,7 +31,13 @@ class Guess:
     component: npt.NDArray[np.int64]  # (N,) connected photos share a number; the largest is 0
 
 
-def average(edges: Sequence[Edge], features: Sequence[PhotoFeatures], priors: Sequence[Prior]) -> Guess:
+def average(
+    edges: Sequence[Edge],
+    features: Sequence[PhotoFeatures],
+    priors: Sequence[Prior],
+    sigma_bias: Array,
+) -> Guess:
+    """sigma_bias: (3,) of the error that all prior positions share."""
     views = [p.view for p in priors]
     relative = [_similarity(e, features, views) for e in edges]
     kept = list(range(len(edges)))
@@ -50,7 +56,7 @@ def average(edges: Sequence[Edge], features: Sequence[PhotoFeatures], priors: Se
         if len(members) == 1:
             moved[members[0]] = views[members[0]]
         else:
-            _anchor(moved, members, priors)
+            _anchor(moved, members, priors, float(sigma_bias[2]))
     false = tuple(e for k, e in enumerate(edges) if k not in set(kept))
     return Guess(tuple(moved), tuple(edges[k] for k in kept), false, component)
 
@@ -176,16 +182,19 @@ def _tree_angles(edges: Sequence[Edge], turn: Array, weight: Array, count: int) 
     return angle
 
 
-def _anchor(views: list[View], members: npt.NDArray[np.int64], priors: Sequence[Prior]) -> None:
+def _anchor(
+    views: list[View], members: npt.NDArray[np.int64], priors: Sequence[Prior], sigma_bias_w: float
+) -> None:
     """Lay a connected group over its priors by one similarity z → f·z + t (complex), linear in f and t.
 
     Beside the positions, the priors' own scale and turn count, as far as they are known."""
     rows, right = [], []
+    shared = sigma_bias_w * float(np.sqrt(len(members)))  # all distances together know it no better than one
     for i in members:
         prior = priors[i]
         turned = np.angle(np.trace(views[i].R[:2, :2].T @ prior.view.R[:2, :2]) + 1j * _skew(views[i], prior))
         ratio = prior.view.C[2] / views[i].C[2]
-        sigma_ratio = ratio * prior.sigma_position[2] / prior.view.C[2]
+        sigma_ratio = ratio * float(np.hypot(prior.sigma_position[2], shared)) / prior.view.C[2]
         if np.isfinite(sigma_ratio) and np.isfinite(prior.sigma_rotation[2]):
             sigma = float(np.hypot(sigma_ratio, ratio * prior.sigma_rotation[2]))
             rows.append(np.array([1.0, 0.0]) / sigma)

@@ -69,7 +69,7 @@ def register_photos(
     if frame.surface is None:
         relief = None
     solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress, relief)
-    found = fates(frame.priors, solved.views, kept_features)
+    found = fates(frame, solved.views, kept_features)
     if len(kept) == 1 and found[0].view is None:
         found = [
             Fate("placed", "the only photo: taken to look squarely at the surface", frame.priors[0].view)

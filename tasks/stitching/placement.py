@@ -49,15 +49,15 @@ def unusable(photos: Sequence[Photo], min_sharpness: float | None) -> dict[int, 
 
 
 def fates(
-    priors: Sequence[Prior],
+    frame: PlaneFrame,
     solved: dict[int, View],
     features: Sequence[PhotoFeatures],
 ) -> list[Fate]:
     """One a photo. `solved`: views of those held by their matches."""
-    result = []
+    priors, result = frame.priors, []
     for i, prior in enumerate(priors):
         if i in solved:
-            result.append(Fate("solved", _far_from_prior(solved[i], prior), solved[i]))
+            result.append(Fate("solved", _far_from_prior(solved[i], prior, frame.sigma_bias), solved[i]))
         elif not prior.has_position:
             what = "the rest of the photos" if solved else "any other photo"
             result.append(Fate("rejected", f"does not match {what}, and its position is not known"))
@@ -77,9 +77,10 @@ def fates(
     return result
 
 
-def _far_from_prior(view: View, prior: Prior) -> str:
+def _far_from_prior(view: View, prior: Prior, sigma_bias: Array) -> str:
     known = np.isfinite(prior.sigma_position)
-    off = np.abs(view.C - prior.view.C)[known] / prior.sigma_position[known]
+    sigma = np.hypot(prior.sigma_position, sigma_bias)
+    off = np.abs(view.C - prior.view.C)[known] / sigma[known]
     if off.size == 0 or off.max() < FAR_SIGMAS:
         return ""
     metres = float(np.linalg.norm((view.C - prior.view.C)[known]))

@@ -18,6 +18,7 @@ COMPASS_DEG = 10.0
 SPREAD_SIGMAS = 2.0  # of the positions' error: from here on positions tell the yaw
 UNKNOWN = np.full(3, np.nan)
 DOWN_DEG = 40.0  # below the horizon: between walls, seen within 30° of squarely, and ground, seen at 45° too
+OVER_TAKE_OFF = 0.5  # 1σ of the plane's height over the take-off (a roof, a deck), of the altitude over it
 GUESSED_TILT_DEG = 8.0  # nobody said where the camera looked: at the surface, roughly
 
 
@@ -151,7 +152,9 @@ def _aslant(prior: Prior) -> Prior:
 
 
 def _ground_plane(photos: Sequence[Photo]) -> PlaneFrame:
-    """Level ground at take-off height, u east, v north; yaw and tilt from the gimbal where it tells."""
+    """Level ground, u east, v north; yaw and tilt from the gimbal where it tells. It lies at the height of
+    the take-off, but for an error that all altitudes share: where the positions' distances tell the scale
+    better, the altitudes do not count."""
     gps = [p.gps for p in photos if p.gps is not None]
     origin = _origin_of([p for p in photos if p.gps is not None])
     altitudes = [g[2] for g in gps if g[2] > 1.0]
@@ -161,7 +164,9 @@ def _ground_plane(photos: Sequence[Photo]) -> PlaneFrame:
     # Yaw in photos' headers is at times 180° off (DJI, gimbal near −90°): far-flung positions tell it better.
     trust_yaw = spread < SPREAD_SIGMAS * max(p.position_sigma_m for p in photos)
     priors = tuple(_from_gps(p, origin, usual, trust_yaw) for p in photos)
-    return PlaneFrame(None, "GPS", priors, _bias(priors))
+    bias = _bias(priors)
+    bias[2] = OVER_TAKE_OFF * (usual or 0.0)
+    return PlaneFrame(None, "GPS", priors, bias)
 
 
 def _from_gps(photo: Photo, origin: GeoOrigin, usual_altitude_m: float | None, trust_yaw: bool) -> Prior:
@@ -172,7 +177,7 @@ def _from_gps(photo: Photo, origin: GeoOrigin, usual_altitude_m: float | None, t
         height = photo.gps[2]
     east, north, _ = origin.to_enu(photo.gps[0], photo.gps[1], 0.0)
     sigma = photo.position_sigma_m
-    # A relative altitude is barometric: good to a metre or some per cent, but the ground is not level.
+    # A relative altitude is barometric: good to a metre or some per cent, beside what all have in common.
     position = np.array([sigma, sigma, max(0.05 * height, 0.5) if usual_altitude_m else np.inf])
     tilt = np.radians(TILT_DEG)
     if photo.view_deg is None:

@@ -49,7 +49,7 @@ def solve(
     matched = match_pairs(pairs, features, frame.priors, ransac_px, lambda f: on_progress(0.6 * f))
     edges = matched
     for _ in range(ATTEMPTS):
-        guess = average(edges, features, frame.priors)
+        guess = average(edges, features, frame.priors, frame.sigma_bias)
         held = _anchored(guess, frame)
         edges = [e for e in guess.edges if e.a in held and e.b in held]
         observations = build_tracks(edges, features)

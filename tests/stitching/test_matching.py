@@ -111,7 +111,7 @@ def test_averaging_finds_the_ring_and_the_false_edge() -> None:
     """Twelve photos from no prior at all, one false edge across the ring: found, and nothing shrinks."""
     views, features, edges = ring(12)
     false = Edge(0, 6, np.column_stack([np.arange(25), np.arange(25)]))
-    guess = average([*edges, false], features, [unknown(v) for v in views])
+    guess = average([*edges, false], features, [unknown(v) for v in views], np.zeros(3))
     assert [(e.a, e.b) for e in guess.false] == [(0, 6)]
     assert len(guess.edges) == len(edges)
     found = np.array([v.centre_uv @ [1, 1j] for v in guess.views])
@@ -126,7 +126,7 @@ def test_averaging_finds_the_ring_and_the_false_edge() -> None:
 def test_groups_without_a_common_photo_are_told_apart() -> None:
     views, features, edges = ring(12)
     apart = [e for e in edges if {e.a, e.b} <= set(range(5)) or {e.a, e.b} <= set(range(5, 12))]
-    guess = average(apart, features, [unknown(v) for v in views])
+    guess = average(apart, features, [unknown(v) for v in views], np.zeros(3))
     assert guess.component.tolist() == [1] * 5 + [0] * 7
 
 

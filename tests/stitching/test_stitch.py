@@ -303,6 +303,40 @@ def located(wall: PhotoSet, sigma_m: float) -> PhotoSet:
     return PhotoSet(tuple(photos), wall.features, wall.truth)
 
 
+def over_a_deck(wall: PhotoSet, sigma_m: float, deck_m: float) -> PhotoSet:
+    """The wall laid flat, so high over the take-off: photographed from above, 4 m over it."""
+    origin, rng = GeoOrigin(latitude_deg=48.0, longitude_deg=11.0), np.random.default_rng(6)
+    photos = []
+    for photo in wall.photos:
+        _, pose = wall.truth[photo.name]
+        x, y, z = pose.position_m
+        east, north, up = np.array([x, z, -y]) + rng.normal(0, sigma_m, 3)
+        latitude, longitude, _ = origin.to_geographic((east, north, 0.0))
+        said = {"gps": (latitude, longitude, up + deck_m), "view_deg": (0.0, -90.0, 0.0)}
+        photos.append(photo.model_copy(update={"pose": None, "position_sigma_m": sigma_m} | said))
+    return PhotoSet(tuple(photos), wall.features, wall.truth)
+
+
+@pytest.mark.parametrize("deck_m", [0.0, 3.0, -2.0])
+def test_a_decks_height_over_the_take_off_is_not_taken_for_its_distance(
+    wall: PhotoSet, deck_m: float
+) -> None:
+    """Distances between positions, 0.1 m each over 3 m, tell the scale to some per cent."""
+    mosaic = over_a_deck(wall, 0.1, deck_m).stitch(None)
+    assert {p.status: p.reason for p in mosaic.placements} == {"solved": ""}
+    assert mosaic.scale_from == "GPS"
+    assert mosaic.scale_sigma is not None
+    assert 0.01 < mosaic.scale_sigma < 0.06
+    assert mosaic.gsd_mm_px == pytest.approx(2.0, rel=3 * mosaic.scale_sigma)
+
+
+def test_positions_that_tell_nothing_leave_the_scale_as_unsure_as_the_take_off(wall: PhotoSet) -> None:
+    mosaic = over_a_deck(wall, 5.0, 3.0).stitch(None)
+    assert mosaic.scale_sigma is not None
+    assert 0.3 < mosaic.scale_sigma < 1.0
+    assert mosaic.gsd_mm_px == pytest.approx(2.0, rel=2 * mosaic.scale_sigma)
+
+
 def test_photos_of_a_wall_need_no_more_than_gps_and_gimbal(wall: PhotoSet) -> None:
     mosaic = located(wall, 0.1).stitch(None)
     assert set(status(mosaic).values()) == {"solved"}
