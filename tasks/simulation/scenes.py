@@ -6,7 +6,7 @@ from threading import Lock
 from typing import Literal
 
 from schemas.inspection import CameraInput, Inspection, SimulationInput
-from schemas.settings import PlanSettings
+from schemas.settings import DetectSettings, PlanSettings
 from schemas.vehicle import Vehicle
 from tasks.simulation import arch, bridge, facade, wall
 from tasks.simulation.scene import Scene
@@ -40,7 +40,9 @@ def ready_inspection(scene: Literal["bridge", "wall"]) -> Inspection:
     simulation = SimulationInput(scene=scene)
     if scene == "wall":
         camera = CameraInput.model_validate(wall.CAMERA.model_dump())
-        return Inspection(name="demo-wall", simulation=simulation, camera=camera)
+        # Our network takes the twisted wires that tie the panels for cracks: they are as dark and as jagged.
+        detect = DetectSettings(method="ridge")
+        return Inspection(name="demo-wall", simulation=simulation, camera=camera, detect=detect)
     return Inspection(
         name="demo",
         simulation=simulation,
