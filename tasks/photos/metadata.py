@@ -1,4 +1,4 @@
-"""What a photo says of its camera and its place: EXIF, and DJI's and Pix4D's XMP."""
+"""What a photo says of its camera and its place: EXIF, and XMP of drones."""
 
 import math
 import re
@@ -8,8 +8,9 @@ from datetime import datetime
 from PIL import Image
 
 from schemas.contract import Vector2, Vector3
+from tasks.photos.view_angles import stated_view_deg, xmp_number
 
-_EXIF_IFD, _GPS_IFD = 0x8769, 0x8825
+_MAKE, _EXIF_IFD, _GPS_IFD = 0x010F, 0x8769, 0x8825
 _EXPOSURE_S, _ISO, _F_NUMBER = 0x829A, 0x8827, 0x829D
 _TAKEN, _TAKEN_FRACTION = 0x9003, 0x9291  # DateTimeOriginal, SubSecTimeOriginal
 _FOCAL_MM, _FOCAL_35MM, _PLANE_X_RESOLUTION, _PLANE_UNIT = 0x920A, 0xA405, 0xA20E, 0xA210
@@ -24,7 +25,7 @@ class Metadata:
     px_per_mm: float | None  # on the sensor, of the image as stored
     calibrated_focal_px: float | None  # DJI's own calibration
     gps: Vector3 | None  # latitude, longitude (degrees), altitude above take-off (m; 0: not known)
-    view_deg: Vector3 | None  # yaw, pitch, roll of the gimbal
+    view_deg: Vector3 | None  # yaw, pitch, roll of the camera, as in CameraPose
     velocity_m_s: Vector3 | None = None  # east, north, up
     metered_ev: float | None = None  # log2 of exposure time (s) · ISO / 100 / f-number²
     size_px: Vector2 | None = None  # width and height that px_per_mm and calibrated_focal_px are of
@@ -35,15 +36,13 @@ def read_metadata(exif: Image.Exif, xmp: bytes) -> Metadata:
     camera = _ifd(exif, _EXIF_IFD)
     unit = _MM_PER_UNIT.get(int(_number(camera.get(_PLANE_UNIT)) or 2))
     resolution = _positive(camera.get(_PLANE_X_RESOLUTION))
-    angles = [_xmp(xmp, f"Gimbal{axis}Degree") for axis in ("Yaw", "Pitch", "Roll")]
-    yaw, pitch, roll = angles
     return Metadata(
         focal_mm=_positive(camera.get(_FOCAL_MM)),
         focal_35mm=_positive(camera.get(_FOCAL_35MM)),
         px_per_mm=resolution / unit if resolution and unit else None,
-        calibrated_focal_px=_positive(_xmp(xmp, "CalibratedFocalLength")),
-        gps=_gps(_ifd(exif, _GPS_IFD), _xmp(xmp, "RelativeAltitude")),
-        view_deg=None if yaw is None or pitch is None else _view(yaw, pitch, roll or 0.0),
+        calibrated_focal_px=_positive(xmp_number(xmp, "CalibratedFocalLength")),
+        gps=_gps(_ifd(exif, _GPS_IFD), xmp_number(xmp, "RelativeAltitude")),
+        view_deg=stated_view_deg(xmp, str(exif.get(_MAKE, ""))),
         velocity_m_s=_velocity(xmp),
         metered_ev=_metered_ev(camera),
         size_px=_size_px(camera),
@@ -78,16 +77,8 @@ def _metered_ev(camera: dict[int, object]) -> float | None:
 
 def _velocity(xmp: bytes) -> Vector3 | None:
     """DJI writes it along north, east and down."""
-    north, east, down = (_xmp(xmp, f"Flight{axis}Speed") for axis in "XYZ")
+    north, east, down = (xmp_number(xmp, f"Flight{axis}Speed") for axis in "XYZ")
     return None if north is None or east is None or down is None else (east, north, -down)
-
-
-def _view(yaw: float, pitch: float, roll: float) -> Vector3 | None:
-    if abs(pitch) > 135 or abs(yaw) > 360 or abs(roll) > 360:
-        return None
-    if abs(roll) > 90:  # DJI writes a gimbal looking down past −90° as rolled by 180°
-        return yaw + 180.0, -180.0 - pitch if pitch < 0 else 180.0 - pitch, roll - math.copysign(180.0, roll)
-    return yaw, pitch, roll
 
 
 def _ifd(exif: Image.Exif, tag: int) -> dict[int, object]:
@@ -108,11 +99,6 @@ def _number(value: object) -> float | None:
 def _positive(value: object) -> float | None:
     number = _number(value)
     return number if number is not None and number > 0 else None
-
-
-def _xmp(xmp: bytes, name: str) -> float | None:
-    found = re.search(name.encode() + rb"\s*(?:=\s*\"|>)\s*([+-]?[0-9.]+)", xmp)
-    return _number(found.group(1).decode()) if found else None
 
 
 def _gps(block: dict[int, object], relative_altitude_m: float | None) -> Vector3 | None:

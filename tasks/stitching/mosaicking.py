@@ -15,9 +15,10 @@ from tasks.stitching.canvas import Canvas, lay_out
 from tasks.stitching.compositing import Pixels, Tile, composite
 from tasks.stitching.control import Gauge, Sightings, fix_gauge, judged, placed_marks
 from tasks.stitching.gain import solve_light
+from tasks.stitching.nadir import borne_out
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.placement import Fate, fates, unusable
-from tasks.stitching.prior import plane_frame
+from tasks.stitching.prior import placeless, plane_frame
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.seams import darkness
 from tasks.stitching.solution import Solved, neighbours, solve
@@ -69,6 +70,10 @@ def register_photos(
     if frame.surface is None:
         relief = None
     solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress, relief)
+    if frame.view_guessed and not borne_out(frame.priors, solved.views, solved.sigma_scale):
+        frame = placeless(kept)
+        pairs = neighbours(kept_features, frame)
+        solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress)
     found = fates(frame, solved.views, kept_features)
     if len(kept) == 1 and found[0].view is None:
         found = [

@@ -44,6 +44,7 @@ class PlaneFrame:
     scale_from: str  # "poses", "GPS", "none"
     priors: tuple[Prior, ...]  # one a photo
     sigma_bias: Array  # (3,) error that all positions share
+    view_guessed: bool = False  # GPS tells the places, but nobody said that the photos look down
 
 
 def plane_frame(photos: Sequence[Photo], surface: Surface | None) -> PlaneFrame:
@@ -59,8 +60,12 @@ def plane_frame(photos: Sequence[Photo], surface: Surface | None) -> PlaneFrame:
     frame = _from_everyones_gps(photos)
     if frame is not None and any(p.has_position for p in frame.priors):
         return frame
-    facing = tuple(_facing(p, 1.0) for p in photos)
-    return PlaneFrame(None, "none", facing, np.zeros(3))
+    return placeless(photos)
+
+
+def placeless(photos: Sequence[Photo]) -> PlaneFrame:
+    """Where no photo's place is known."""
+    return PlaneFrame(None, "none", tuple(_facing(p, 1.0) for p in photos), np.zeros(3))
 
 
 def _from_everyones_gps(photos: Sequence[Photo]) -> PlaneFrame | None:
@@ -166,7 +171,7 @@ def _ground_plane(photos: Sequence[Photo]) -> PlaneFrame:
     priors = tuple(_from_gps(p, origin, usual, trust_yaw) for p in photos)
     bias = _bias(priors)
     bias[2] = OVER_TAKE_OFF * (usual or 0.0)
-    return PlaneFrame(None, "GPS", priors, bias)
+    return PlaneFrame(None, "GPS", priors, bias, all(p.view_deg is None for p in photos))
 
 
 def _from_gps(photo: Photo, origin: GeoOrigin, usual_altitude_m: float | None, trust_yaw: bool) -> Prior:
@@ -180,10 +185,10 @@ def _from_gps(photo: Photo, origin: GeoOrigin, usual_altitude_m: float | None, t
     # A relative altitude is barometric: good to a metre or some per cent, beside what all have in common.
     position = np.array([sigma, sigma, max(0.05 * height, 0.5) if usual_altitude_m else np.inf])
     tilt = np.radians(TILT_DEG)
-    if photo.view_deg is None:
+    if photo.view_deg is None:  # taken to look down, but not so surely that its altitude is its distance
         view = View(photo.camera, FACING, np.array([east, north, height]))
         guessed = np.radians(GUESSED_TILT_DEG)
-        return Prior(view, position, np.array([guessed, guessed, np.inf]))
+        return Prior(view, np.array([sigma, sigma, np.inf]), np.array([guessed, guessed, np.inf]))
     yaw, pitch, roll = photo.view_deg
     pose = CameraPose(position_m=(east, north, height), yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)
     if pose.R_world_camera[2, 2] > -0.17:
