@@ -22,6 +22,7 @@ Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.int64]
 
 MOST_SAMPLES = 200_000  # of one surface
+FEWEST_SAMPLES = 100  # of one surface, however much smaller than a photo it is
 SAMPLES_ACROSS = 12  # a photo's shorter side
 GSD_TOLERANCE = 1.02  # a pixel this much larger than asked still counts: rounding of angles and places
 BIAS_S = 120.0  # memory of the slow part of the position error, which walks over minutes
@@ -208,9 +209,13 @@ def _samples(surface: Surface, spacing_m: float) -> tuple[Array, float]:
     outline = outline_of(surface)
     cell = max(spacing_m, float(np.sqrt(outline.area / MOST_SAMPLES)))
     u_low, v_low, u_high, v_high = surface.bounds_m
-    u, v = np.meshgrid(np.arange(u_low + cell / 2, u_high, cell), np.arange(v_low + cell / 2, v_high, cell))
-    inside = shapely.contains_xy(outline, u, v)
-    return np.column_stack([u[inside], v[inside]]), cell
+    while True:
+        us, vs = np.arange(u_low + cell / 2, u_high, cell), np.arange(v_low + cell / 2, v_high, cell)
+        u, v = np.meshgrid(us, vs)
+        inside = shapely.contains_xy(outline, u, v)
+        if inside.sum() >= FEWEST_SAMPLES or outline.area == 0:
+            return np.column_stack([u[inside], v[inside]]), cell
+        cell /= 2  # a strip may lie between the middles of coarser squares
 
 
 def _optics(camera: Camera) -> tuple[tuple[float, ...], float]:

@@ -92,7 +92,7 @@ def prove(
         gsd_mm_px=round(camera.gsd_mm_px(stand_off_m), 5),
         photos=len(poses),
         not_reached=reasons(seen, completed.unreachable_m2, reachable),
-        reachable=round(float(reachable.mean()), 5),
+        reachable=round(float(reachable.mean()), 5) if reachable.any() else 0.0,
         twice=round(float((seen.photos[reachable] >= 2).mean()), 5) if reachable.any() else 0.0,
         twice_median=round(float(np.median(flown.twice)), 5) if reachable.any() else 0.0,
         twice_p05=round(float(np.quantile(flown.twice, 0.05)), 5) if reachable.any() else 0.0,

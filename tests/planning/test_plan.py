@@ -233,3 +233,11 @@ def test_a_camera_whose_distortion_folds_its_image_is_refused() -> None:
     camera = CAMERA.model_copy(update={"focal_px": 900.0, "k1": -0.25})
     with pytest.raises(BadInput, match="distortion"):
         plan_and_prove(wall().structure, wall().cloud, camera, VEHICLE, ORIGIN, None, SETTINGS)
+
+
+def test_a_strip_narrower_than_the_squares_of_the_proof_is_judged_too() -> None:
+    strip = rectangle("strip-01", (0.0, 0.0, 9.5), (0, -1, 0), 6.0, 0.05)
+    made = planned(wall().add(strip))
+    judged = {coverage.surface: coverage for coverage in made.coverage}["strip-01"]
+    assert judged.covered > 0.9
+    assert judged.reachable > 0.9
