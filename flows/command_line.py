@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
-from pydantic import ValidationError
 
 from flows.console import err, out
 from schemas.problem import BadInput
@@ -143,11 +142,6 @@ def main() -> None:
         _say("Error", str(problem))
         code = EXIT_UNUSABLE_INPUT
     except cyclopts.CycloptsError:  # cyclopts has said what is wrong with the words of the command
-        code = EXIT_UNUSABLE_INPUT
-    except ValidationError as problem:
-        from flows.inspection_file import explain
-
-        _say("Error", str(explain("settings", problem)))
         code = EXIT_UNUSABLE_INPUT
     except KeyboardInterrupt:
         _say("Interrupted", "finished stages are kept; the same command goes on from there.")

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from flows.command_line import app
 from flows.console import out as console
+from flows.option_types import Gsd
 from flows.photo_commands import Method
 from flows.plain_files import OutFolder, photos_in, warn, working
 from schemas.detection import Patterns
@@ -44,7 +45,7 @@ def evaluate(
     *,
     out: OutFolder,
     method: Annotated[tuple[Method, ...], Parameter(consume_multiple=True)] = (),
-    gsd_mm_px: float | None = None,
+    gsd_mm_px: Gsd = None,
 ) -> None:
     """Compare found cracks with drawn masks: precision, recall, F1 at 0, 2 and 5 px, D/evaluation.json;
     D/curves.png with precision, recall and calibration of the network; D/worst/ with the worst images, what

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 from flows.command_line import app
 from flows.console import err
+from flows.option_types import Gsd, of_options
 from flows.plain_files import (
     OutFolder,
     one_by_one,
@@ -33,7 +34,7 @@ def stitch(
     folder: Path,
     *,
     out: OutFolder,
-    gsd_mm_px: float | None = None,
+    gsd_mm_px: Gsd = None,
     camera: Path | None = None,
     control: Path | None = None,
 ) -> None:
@@ -102,7 +103,7 @@ def detect(
     *,
     out: OutFolder,
     method: Method = "hairline",
-    gsd_mm_px: float | None = None,
+    gsd_mm_px: Gsd = None,
     global_threshold: int | None = None,
     model: Path | None = None,
     min_score: float = 0.5,
@@ -137,7 +138,8 @@ def detect(
         raise BadInput("--model", "goes with --method onnx, and only with it", "Give both or neither")
     if model is not None and not model.is_file():
         raise BadInput(str(model), "no such file", "Correct the path")
-    settings = DetectSettings(
+    settings = of_options(
+        DetectSettings,
         method=method,
         global_threshold=global_threshold,
         model=model.name if model else None,
@@ -202,7 +204,7 @@ def detected(
 
 
 @app.command
-def measure(image: Path, mask: Path, *, out: OutFolder, gsd_mm_px: float | None = None) -> None:
+def measure(image: Path, mask: Path, *, out: OutFolder, gsd_mm_px: Gsd = None) -> None:
     """Measure the cracks that a mask marks in an image: D/cracks.json.
 
     Parameters

@@ -12,6 +12,7 @@ from flows.command_line import app
 from flows.console import err
 from flows.console import out as console
 from flows.inspection_file import explain
+from flows.option_types import Gsd, Model, Positive, PositiveOrNone, bad_option
 from flows.plain_files import Many, read_camera, read_contract, say, warn, working
 from flows.structure_commands import enter_beside
 from schemas.problem import BadInput
@@ -33,7 +34,7 @@ def plan(
     *,
     camera: Path,
     out: Annotated[Path | None, Parameter(name="--out")] = None,
-    gsd_mm_px: float | None = None,
+    gsd_mm_px: Gsd = None,
     smallest_crack_mm: float | None = None,
     overlap: float | None = None,
     inspect: Annotated[tuple[str, ...], Many] = (),
@@ -46,8 +47,8 @@ def plan(
     free: list[Six] | None = None,
     close_ups: Path | None = None,
     what_if: Annotated[bool, Parameter(negative=())] = False,
-    stand_off_m: float | None = None,
-    area_m2: float = 100.0,
+    stand_off_m: PositiveOrNone = None,
+    area_m2: Positive = 100.0,
 ) -> None:
     """Plan collision-free flights: D/plan.json and for each D/mission.waypoints, .plan, .kmz, .kml and .csv.
 
@@ -65,7 +66,7 @@ def plan(
     smallest_crack_mm:
         Smallest crack to detect, mm. Default: 0.3.
     overlap:
-        Of neighbouring photos, 0.1 to 0.95, widened for the position error. Default: 0.6.
+        Of neighbouring photos, 0.1 to below 0.95, widened for the position error. Default: 0.6.
     inspect:
         Names of the surfaces to inspect. Default: all but the ground.
     clearance_m:
@@ -232,15 +233,17 @@ def _sections(path: Path, vehicle: dict[str, Any], asked: dict[str, Any]) -> tup
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     content = content if isinstance(content, dict) else {}
 
-    def with_options(section: str, options: dict[str, Any]) -> dict[str, Any]:
-        given = content.get(section)
-        stated = {key: value for key, value in options.items() if value is not None}
-        return {**(given if isinstance(given, dict) else {}), **stated}
+    return (
+        _section(path, content.get("vehicle"), Vehicle, vehicle),
+        _section(path, content.get("plan"), PlanSettings, asked),
+    )
 
+
+def _section(path: Path, given: object, contract: type[Model], options: dict[str, Any]) -> Model:
+    stated = {key: value for key, value in options.items() if value is not None}
     try:
-        return (
-            Vehicle.model_validate(with_options("vehicle", vehicle)),
-            PlanSettings.model_validate(with_options("plan", asked)),
-        )
+        return contract.model_validate({**(given if isinstance(given, dict) else {}), **stated})
     except ValidationError as problem:
+        if problem.errors()[0]["loc"][0] in stated:
+            raise bad_option(problem) from None
         raise explain(str(path), problem) from None

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from flows.command_line import app
+from flows.option_types import of_options
 from flows.plain_files import (
     OutFolder,
     one_by_one,
@@ -63,7 +64,7 @@ def register(
     with working(out):
         known = read_survey(survey, list(scans)) if survey else Survey()
         usable, left_out = one_by_one(list(scans), lambda path: ingested_scan(path, known.of(path, unit)))
-        settings = RegistrationSettings(voxel_m=voxel_m, tau_m=tau_m, require_all=require_all)
+        settings = of_options(RegistrationSettings, voxel_m=voxel_m, tau_m=tau_m, require_all=require_all)
         read: tuple[Scan, ...] = tuple(usable)
         model = register_scans.bare(read, settings, known.targets)
         write_registration(out, model, copy=True)
@@ -126,7 +127,9 @@ def surfaces(
         model = registered_beside(cloud) or register_scans.bare(
             ingested_scan(cloud, ScanInput(file=cloud.name, unit=unit)), RegistrationSettings()
         )
-        settings = SurfaceSettings(min_area_m2=min_area_m2, distance_m=distance_m, epsilon_m=epsilon_m)
+        settings = of_options(
+            SurfaceSettings, min_area_m2=min_area_m2, distance_m=distance_m, epsilon_m=epsilon_m
+        )
         structure = extract.bare(model, settings)
         write_structure(out, structure, copy=True)
         write_png(out / "surfaces.png", picture(structure))

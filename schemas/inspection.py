@@ -8,6 +8,7 @@ from schemas.camera import Camera, check_lens
 from schemas.contract import Contract, Matrix4, Vector3
 from schemas.control import Control
 from schemas.geodesy import GeoOrigin, KnownPoint
+from schemas.gsd import GsdMmPx
 from schemas.scanning import Scanning
 from schemas.settings import (
     AssessSettings,
@@ -77,7 +78,7 @@ class PhotoSet(Contract):
     folder: str
     surface: str | None = None  # None: by the flight log's shots, else the folder's name
     stitch: bool = True  # False: each photo stands for itself
-    gsd_mm_px: float | None = Field(default=None, gt=0)
+    gsd_mm_px: GsdMmPx | None = None
     stand_off_m: float | None = Field(default=None, gt=0)  # with a camera, the other way to say the GSD
 
 

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from schemas.box import Box
 from schemas.contract import Contract, Vector2
+from schemas.gsd import GsdMmPx
 
 
 class RegistrationSettings(Contract):
@@ -30,7 +31,7 @@ class SurfaceSettings(Contract):
 class PlanSettings(Contract):
     smallest_crack_mm: float = Field(default=0.3, gt=0)  # to be detected; its width is one GSD
     smallest_measured_mm: float | None = Field(default=None, gt=0)  # to be measured; three GSD wide
-    gsd_mm_px: float | None = Field(default=None, gt=0)  # None: from the smallest cracks
+    gsd_mm_px: GsdMmPx | None = None  # None: from the smallest cracks
     overlap: float = Field(default=0.6, ge=0.1, lt=0.95)  # between neighbours, both axes, before widening
     max_incidence_deg: float = Field(default=45.0, gt=0, lt=80)  # more oblique views are not counted
     voxel_m: float = Field(default=0.25, gt=0)  # occupancy grid
@@ -63,7 +64,7 @@ class FlightSettings(Contract):
 
 class StitchSettings(Contract):
     features: int = Field(default=4000, ge=100)  # most SIFT features of a photo
-    gsd_mm_px: float | None = Field(default=None, gt=0)  # states the scale; None: from poses or GPS
+    gsd_mm_px: GsdMmPx | None = None  # states the scale; None: from poses or GPS
     ransac_px: float = Field(default=3.0, gt=0)  # inlier distance of the homography
     min_sharpness: float | None = None  # None: photos far below their neighbours are rejected as blurred
 
