@@ -61,6 +61,8 @@ def register(
     from tasks.registration.task import picture
     from tasks.registration.task import register as register_scans
 
+    if not scans:
+        raise BadInput("register", "no scan is given", "Name the scan files before --out")
     with working(out):
         known = read_survey(survey, list(scans)) if survey else Survey()
         usable, left_out = one_by_one(list(scans), lambda path: ingested_scan(path, known.of(path, unit)))

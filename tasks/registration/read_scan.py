@@ -21,10 +21,7 @@ READERS: dict[str, ModuleType] = {
 SMALLEST_M, LARGEST_M = 0.2, 10_000.0  # extent of what a terrestrial scanner sees of a structure
 FARTHEST_M = 1e8  # no coordinate system on Earth goes so far
 LARGE_COORDINATE_M = 1000.0  # beyond it float32 is coarser than 0.06 mm: shift to a local origin
-UNITS_M = {
-    "kilometres": 1000.0, "metres": 1.0, "feet": 0.3048, "inches": 0.0254, "centimetres": 0.01,
-    "millimetres": 0.001,
-}  # fmt: skip
+UNITS_M = {"km": 1000.0, "m": 1.0, "ft": 0.3048, "in": 0.0254, "cm": 0.01, "mm": 0.001}
 TYPICAL_EXTENT_M = 60.0
 
 
@@ -170,14 +167,13 @@ def _check_extent(points_m: Array, unit_m: float, name: str) -> None:
     if extent_m == 0.0 or SMALLEST_M <= extent_m <= LARGEST_M:
         return
     in_file = extent_m / unit_m
-    likely, likely_m = min(
-        UNITS_M.items(), key=lambda unit: abs(np.log(in_file * unit[1] / TYPICAL_EXTENT_M))
-    )
+    likely = min(UNITS_M, key=lambda unit: abs(np.log(in_file * UNITS_M[unit] / TYPICAL_EXTENT_M)))
+    remedy = "convert it to metres" if likely == "km" else f"state unit: {likely}, or --unit {likely}"
     size = f"{extent_m / 1000:.3g} km" if extent_m > LARGEST_M else f"{extent_m * 1000:.3g} mm"
     raise BadInput(
         name,
         f"taken in units of {unit_m:g} m it is {size} large, which no scanned structure is",
-        f"Its unit is likely {likely}: state unit_m {likely_m:g}.",
+        f"Its unit is likely {likely}: {remedy}.",
     )
 
 

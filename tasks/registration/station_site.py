@@ -77,11 +77,18 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
             scanner_m = transform(inverse(prior), position_m[None])[0]
     elif prior is not None and scanner_m is not None:
         position_m = transform(prior, scanner_m[None])[0]
+    coarse_m = coarse_voxel_m(fine, scanner_m)
+    if (near := len(on_surfaces(fine, coarse_m))) < LEAST_POINTS:
+        raise BadInput(
+            scan.name,
+            f"too few points to show a surface: {near} of {len(fine)} have another within {coarse_m:.1f} m",
+            "Scan more densely, or leave the file out.",
+        )
     return Site(
         name=scan.name,
         fine=shelf.put(fine),
         sample_m=fine.points_m[:: max(1, len(fine) // OVERLAP_POINTS)].copy(),
-        coarse_voxel_m=coarse_voxel_m(fine, scanner_m),
+        coarse_voxel_m=coarse_m,
         scanner_m=scanner_m,
         shift_m=loaded.origin_m,
         prior_T_world_local=prior,

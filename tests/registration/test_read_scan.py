@@ -100,9 +100,9 @@ def test_extent_names_the_likely_unit(tmp_path: Path) -> None:
     bridge = POINTS * [10, 10, 2]  # about 70 m
     millimetres = written(tmp_path, "mm.xyz", rows(bridge * 1000))
     kilometres = written(tmp_path, "km.xyz", rows(bridge / 1000))
-    with pytest.raises(BadInput, match=r"likely millimetres: state unit_m 0\.001"):
+    with pytest.raises(BadInput, match=r"likely mm: state unit: mm, or --unit mm"):
         read_scan(millimetres)
-    with pytest.raises(BadInput, match="likely kilometres: state unit_m 1000"):
+    with pytest.raises(BadInput, match="likely km: convert it to metres"):
         read_scan(kilometres)
     assert np.allclose(read_scan(millimetres, unit_m=0.001).points_m, bridge)
 

@@ -1,12 +1,28 @@
 """Scans that are sparse, full of dust, or of an unknown scanner."""
 
-import numpy as np
+from pathlib import Path
 
+import numpy as np
+import pytest
+
+from schemas.file import File
+from schemas.problem import BadInput
+from schemas.scan import Scan
+from tasks.registration.cloud_shelf import Shelf
 from tasks.registration.read_scan import LoadedScan
 from tasks.registration.rigid_motion import Array
 from tasks.registration.station_cloud import Cloud, coarse_voxel_m, estimated_normals, fine_cloud, on_surfaces
+from tasks.registration.station_site import site
 from tasks.registration.visibility import range_image
 from tests.registration.site import BRIDGE, points_seen, pose_of
+
+
+def test_points_too_far_apart_to_show_a_surface_are_refused_by_name(tmp_path: Path) -> None:
+    points_m = np.random.default_rng(0).uniform(0, 3000, (1000, 3)) * [1, 1, 0.01]
+    scan = Scan(name="thin.las", file=File(sha256="0" * 64, size=1, suffix=".las"), index=0)
+    blocks = [LoadedScan(points_m, None, None, np.zeros(3), np.zeros(3))]
+    with pytest.raises(BadInput, match=r"thin\.las: too few points"):
+        site(scan, blocks, 0.02, Shelf(tmp_path))
 
 
 def cloud(points_m: Array) -> Cloud:
