@@ -16,9 +16,22 @@ def read_inspection(path: Path) -> Inspection:
     if isinstance(content.get("camera"), str):
         content["camera"] = read_camera_file(existing(path.parent, content["camera"], "camera")).model_dump()
     try:
-        return Inspection.model_validate(content)
+        inspection = Inspection.model_validate(content)
     except ValidationError as problem:
         raise explain(str(path), problem) from None
+    _refuse_photos_given_twice(path, inspection)
+    return inspection
+
+
+def _refuse_photos_given_twice(path: Path, inspection: Inspection) -> None:
+    """A folder that is given twice for one surface would count its cracks twice."""
+    seen: set[tuple[Path, str]] = set()
+    for photos in inspection.photos:
+        folder = (path.parent / photos.folder).resolve()
+        given = folder, photos.surface or folder.name
+        if given in seen:
+            raise BadInput(str(path), f"gives the photos {photos.folder!r} twice", "Give each folder once")
+        seen.add(given)
 
 
 def settings_in(path: Path) -> dict[str, Any]:

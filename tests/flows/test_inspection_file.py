@@ -39,6 +39,10 @@ def test_a_minimal_file_gets_every_default(tmp_path: Path) -> None:
         ("", "holds no settings"),
         ("- a\n", "holds no settings"),
         ("name: a\ncamera: {width_px: 100, height_px: 100}\n", "focal_mm together with sensor_width_mm"),
+        (
+            "name: a\nphotos: [{folder: p}, {folder: ./q/../p, surface: p}]\n",
+            "gives the photos './q/../p' twice",
+        ),
         ("name: a\nstitch: {ransac_px: .nan}\n", "key 'stitch.ransac_px'"),
     ],
 )
