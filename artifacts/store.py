@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from schemas.file import File, Folder, FolderEntry
+from schemas.problem import BadInput
 
 _verified: dict[tuple[str, int, int, int], bool] = {}  # (sha, inode, size, mtime) → same bytes
 
@@ -25,8 +26,16 @@ class Store:
 
     def put(self, path: Path, suffix: str | None = None) -> File:
         """Enter a file that stays where it is (reflink or hard link where the disk allows, else a copy), and
-        is not written to again."""
-        file = File(sha256=digest(path), size=path.stat().st_size, suffix=suffix or path.suffix.lower())
+        is not written to again. BadInput where it cannot be read."""
+        try:
+            sha256 = digest(path)
+        except OSError as problem:
+            raise BadInput(
+                path.name,
+                f"cannot be read ({problem.strerror})",
+                "Give a file that can be read, or leave it out",
+            ) from None
+        file = File(sha256=sha256, size=path.stat().st_size, suffix=suffix or path.suffix.lower())
         target = self._object(file.sha256, file.suffix)
         if not self.holds(file):
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -78,8 +78,19 @@ def convert_log(log: Path, *, out: Annotated[Path, Parameter(name="--out")]) -> 
     """
     from tasks.flight.task import convert
 
+    if log.is_dir():
+        raise BadInput(str(log), "is a folder", "Convert one log at a time")
     if not log.is_file():
         raise BadInput(str(log), "no such file", "Correct the path")
+    if out.is_dir():
+        raise BadInput(str(out), "is a folder", "Give --out the name of the MCAP file to write")
+    if out.exists() and out.samefile(log):
+        raise BadInput(str(out), "is the log itself, which is kept", "Give another --out")
     with working(out.resolve().parent):
-        convert(log, out)
-    say(f"Wrote {out}")
+        recording = convert(log, out)
+    times_s = [fix.time_s for fix in recording.fixes]
+    minutes = (max(times_s) - min(times_s)) / 60 if times_s else 0.0
+    say(f"{minutes:.1f} min, {len(times_s):,} positions, {len(recording.triggers):,} photos: {out}")
+    if not times_s:
+        text = f"Warning: {log.name} holds no position: is it whole?".replace("[", r"\[")
+        err.print(f"[yellow]{text}[/yellow]")

@@ -73,7 +73,7 @@ def position_sigma_m(inspection: Inspection) -> float:
 
 def _photos_in(folder: Path, stated: str) -> list[Path]:
     photos = folder.iterdir() if folder.is_dir() else ()
-    paths = sorted(p for p in photos if p.suffix.lower() in PHOTO_SUFFIXES)
+    paths = sorted(p for p in photos if p.suffix.lower() in PHOTO_SUFFIXES and p.is_file())
     if not paths:
         raise BadInput(stated, "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
     return paths

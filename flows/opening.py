@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from artifacts.run_folder import remove_stale
 from flows import results
 from flows.inspection_file import read_inspection
+from flows.output_folder import make_output_folder
 from schemas.crack_report import CrackReport
 from schemas.file import Folder
 from schemas.flight_plan import FlightPlan
@@ -71,6 +72,7 @@ def opened(inspection: str, out: str | None = None, redo: tuple[str, ...] = ()) 
         settings, base = read_inspection(path), path.resolve().parent
         folder = Path(out or f"runs/{settings.name}")
     folder = folder.resolve()
+    make_output_folder(folder)
     caller = run.current()
     tokens = _redo_tokens(folder, redo, keep=not caller.dry)
     with (
@@ -115,6 +117,5 @@ def _redo_tokens(folder: Path, redo: tuple[str, ...], keep: bool) -> dict[str, s
         stage.replace("-", "_"): uuid.uuid4().hex for stage in redo if stage.replace("-", "_") not in tokens
     }
     if tokens and keep:
-        folder.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(tokens))
     return tokens

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from flows.console import StageLines, err
 from flows.console import out as console
 from flows.inspection_file import explain, read_camera_file
+from flows.output_folder import make_output_folder
 from schemas.camera import Camera
 from schemas.control import Control
 from schemas.problem import BadInput, LeftOut
@@ -27,10 +28,7 @@ def working(folder: Path) -> Iterator[Callable[[float], None]]:
     from artifacts import store
     from tasks import run
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise BadInput(str(folder), f"cannot be made ({problem.strerror})", "Give another --out") from None
+    make_output_folder(folder)
     with store.temporary(), StageLines() as lines, run.running(run.Run(listener=lines)):
         yield lambda fraction: lines(run.Event("", "progress", fraction=fraction))
 
@@ -99,7 +97,7 @@ def photos_in(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise BadInput(str(path), "no such file or folder", "Correct the path")
-    paths = sorted(p for p in path.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES)
+    paths = sorted(p for p in path.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES and p.is_file())
     if not paths:
         raise BadInput(str(path), "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
     return paths

@@ -137,7 +137,9 @@ def _photos(folder: Path) -> list[Path]:
 
     try:
         found = [
-            p for p in folder.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES and not p.name.startswith(".")
+            p
+            for p in folder.iterdir()
+            if p.suffix.lower() in PHOTO_SUFFIXES and not p.name.startswith(".") and p.is_file()
         ]
         return sorted(found, key=lambda p: (p.stat().st_mtime_ns, p.name))
     except OSError:  # a card pulled out, a file renamed just now: the next look tells

@@ -86,8 +86,9 @@ def import_log(log: File, name: str, plan: FlightPlan | None) -> FlightLog:
         return _flight_log(recording, store.current().put(converted), plan, name)
 
 
-def convert(log: Path, out: Path) -> None:
-    """Convert a flight log (tlog, BIN, ulg) to MCAP, whole. BadInput where it is none or damaged."""
+def convert(log: Path, out: Path) -> "Recording":
+    """Convert a flight log (tlog, BIN, ulg) to MCAP, whole; gives what it holds. BadInput where it is none or
+    damaged."""
     from tasks.flight.read_log import kind_of_log
 
     kind = kind_of_log(log, log.name)
@@ -95,8 +96,9 @@ def convert(log: Path, out: Path) -> None:
         raise BadInput(log.name, "is an MCAP file already", "Use it as it is")
     unfinished = out.with_name(f".{out.name}.unfinished")
     try:
-        _converted(log, kind, log.name, unfinished)
+        recording = _converted(log, kind, log.name, unfinished)
         unfinished.replace(out)
+        return recording
     finally:
         unfinished.unlink(missing_ok=True)
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from artifacts import store
 from artifacts.store import Store
+from schemas.problem import BadInput
 
 
 @given(content=st.binary(max_size=2000))
@@ -20,6 +21,12 @@ def test_what_is_put_is_read_back(tmp_path: Path, content: bytes) -> None:
     file = kept.put(source)
     assert kept.path(file).read_bytes() == content
     assert (file.size, file.suffix) == (len(content), ".bin")
+
+
+def test_what_cannot_be_read_is_told_by_its_name(tmp_path: Path) -> None:
+    (tmp_path / "folder.jpg").mkdir()
+    with pytest.raises(BadInput, match=r"^folder\.jpg: cannot be read"):
+        Store(tmp_path / "store").put(tmp_path / "folder.jpg")
 
 
 def test_the_same_bytes_are_kept_once(tmp_path: Path) -> None:
