@@ -82,11 +82,13 @@ def collect(
     if inspection.simulation is not None and inspection.simulation.scene == "wall":
         return _simulated_wall(inspection.simulation)
     surfaces = structure.surfaces if structure else ()
-    planned = plan(inspection, structure) if structure is not None and inspection.camera else None
+    to_plan = inspection.camera is not None or (inspection.flight is not None and not inspection.photos)
+    planned = plan(inspection, structure) if structure is not None and to_plan else None
     if planned is not None:
         save_plan(planned)
     if inspection.flight is None or planned is None:
-        return Collected(planned, photos=tuple(given_photos(inspection, base, None)), surfaces=surfaces)
+        given = tuple(given_photos(inspection, base, None))
+        return Collected(planned, None, given, _unused(inspection, structure), surfaces)
     if inspection.flight == "external":
         photo_sets, paths = photos_and_logs(inspection, base)
         inspection = inspection.model_copy(update={"photos": photo_sets})
@@ -97,6 +99,20 @@ def collect(
     simulated = inspection.simulation is not None and inspection.flight == "simulated"
     photos = _simulated_photos(inspection, planned, log) if simulated else given_photos(inspection, base, log)
     return Collected(planned, log, tuple(photos), _missed(log), surfaces)
+
+
+def _unused(inspection: Inspection, structure: Structure | None) -> tuple[LeftOut, ...]:
+    """What the inspection gives of a flight although none can be planned: told, not passed over."""
+    if inspection.flight is None:
+        lacking, why = "flight", "nothing says whose flight it is of"
+    else:
+        lacking = "scans" if structure is None else "camera"
+        why = f"no plan was made, since the key '{lacking}' is missing"
+    given = [key for key in ("flight", "flight_log") if getattr(inspection, key) is not None]
+    return tuple(
+        LeftOut(item=key, stage="flight", what=f"not used: {why}", remedy=f"Give the key '{lacking}'")
+        for key in given
+    )
 
 
 def _flown(inspection: Inspection, planned: FlightPlan) -> FlightLog:

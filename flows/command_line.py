@@ -1,6 +1,7 @@
 """The `hairline` command."""
 
 import os
+import shlex
 import sys
 import traceback
 from pathlib import Path
@@ -92,7 +93,7 @@ def init(folder: Path, *, name: str | None = None) -> int:
     from flows.init_inspection import init_inspection
 
     path = init_inspection(folder, name)
-    out.print(f"Wrote {path}. Check it, then: hairline run {path}")
+    out.print(f"Wrote {path}. Check it, then: hairline run {shlex.quote(str(path))}", markup=False)
     return 0
 
 

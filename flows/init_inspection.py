@@ -59,7 +59,8 @@ def init_inspection(folder: Path, name: str | None) -> Path:
 
 def described(model: type[BaseModel]) -> list[str]:
     """`key: default  # why`, the words taken from the comment on the field's own line."""
-    comments = dict(re.findall(r"^    (\w+): .*?  # (.*)$", inspect.getsource(model), flags=re.MULTILINE))
+    source = re.sub(r"\bNone\b", "null", inspect.getsource(model))  # as YAML says it
+    comments = dict(re.findall(r"^    (\w+): .*?  # (.*)$", source, flags=re.MULTILINE))
     lines = []
     for key, field in model.model_fields.items():
         comment = f"  # {comments[key]}" if key in comments else ""

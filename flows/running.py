@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -85,11 +86,11 @@ def run_inspection(
         report = run_flow(inspection, _text(folder), redo, _text(photos), tuple(str(log) for log in logs))
     except WaitingForFlight:
         out.print(f"The plan is ready: {where / 'plan'}. Fly it, then:")
-        out.print(f"  hairline run {inspection} --photos DIR --log FILE [FILE …]", markup=False)
+        out.print(f"  hairline run {shlex.quote(inspection)} --photos DIR --log FILE [FILE …]", markup=False)
         return EXIT_WAITING_FOR_FLIGHT
     except WaitingForBattery as waiting:
         out.print(f"{waiting} Change the battery, stand clear, then run again:")
-        out.print(f"  hairline run {inspection}", markup=False)
+        out.print(f"  hairline run {shlex.quote(inspection)}", markup=False)
         out.print(f"The vehicle takes off at once then, with battery {waiting.flown + 1}.")
         return EXIT_WAITING_FOR_FLIGHT
     say_results(report, where)
@@ -134,7 +135,8 @@ def dry_run(inspection: str, folder: Path | None, redo: tuple[str, ...]) -> int:
 def say_results(report: CrackReport | None, folder: Path) -> None:
     """Where the results are; the last line is a warning where something was not inspected."""
     if report is None:
-        out.print(f"\nThe plan: {folder / 'plan'}")
+        made = "plan" if (folder / "plan").is_dir() else "surfaces"
+        out.print(f"\nThe {made}: {folder / made}")
         return
     widths = [crack.width_max_mm for crack in report.cracks if crack.width_max_mm is not None]
     widest = f", the widest {max(widths):.1f} mm" if widths else ""

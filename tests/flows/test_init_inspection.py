@@ -1,10 +1,12 @@
 """`hairline init` writes a file that `hairline run` reads, every setting explained."""
 
+import shlex
 from pathlib import Path
 
 import pytest
 import yaml
 
+from flows.command_line import init
 from flows.init_inspection import SECTIONS, described, init_inspection
 from flows.inspection_file import read_inspection
 from schemas.inspection import Inspection
@@ -28,6 +30,11 @@ def test_what_lies_in_the_folder_is_found(tmp_path: Path) -> None:
     assert (inspection.flight, inspection.flight_log) == ("external", "flight.BIN")
 
 
+def test_the_command_to_run_it_can_be_pasted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert init(site(tmp_path, "p/1.jpg")) == 0
+    assert shlex.split(capsys.readouterr().out)[-1] == str(tmp_path / "North Pier: 2" / "inspection.yaml")
+
+
 def test_the_explained_settings_are_the_defaults(tmp_path: Path) -> None:
     path = init_inspection(site(tmp_path, "p/1.jpg"), "x")
     text = path.read_text()
@@ -42,6 +49,7 @@ def test_the_explained_settings_are_the_defaults(tmp_path: Path) -> None:
 def test_most_settings_say_why(section: str) -> None:
     lines = described(SECTIONS[section])
     assert sum("  # " in line for line in lines) >= 0.6 * len(lines), lines
+    assert not any("None" in line for line in lines)  # YAML says null
 
 
 def test_an_inspection_that_is_there_is_not_written_over(tmp_path: Path) -> None:

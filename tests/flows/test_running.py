@@ -91,6 +91,16 @@ def test_a_bad_photo_among_good_ones_is_left_out_by_name(run: Run, tmp_path: Pat
     assert {crack["surface"] for crack in report["cracks"]} == {"wall-1.jpg", "wall-3.jpg"}
 
 
+def test_a_log_that_nothing_uses_is_told(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert running.run_inspection("site/inspection.yaml", None, (), None, (Path("picture.png"),)) == 0
+    assert "not inspected: flight_log: not used: nothing says whose flight" in capsys.readouterr().out
+    path = tmp_path / "site/inspection.yaml"
+    path.write_text(path.read_text() + "flight: external\nflight_log: a.tlog\n")
+    assert "flight: not used: no plan was made, since the key 'scans' is missing (and 1 more" in run()
+
+
 def test_no_usable_photo_is_an_error_that_names_one(run: Run, tmp_path: Path) -> None:
     for path in (tmp_path / "site/photos").iterdir():
         path.write_bytes(b"not a photo")
