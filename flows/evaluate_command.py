@@ -150,7 +150,8 @@ def prepared(path: Path, gsd_mm_px: float | None, shape: tuple[int, ...]) -> tup
     photo = ingest.bare(store.current().put(path), path.name, path.stem, None, None, 5.0)
     mosaic = single.bare(photo, gsd_mm_px)
     if (mosaic.height_px, mosaic.width_px) != shape:
-        raise BadInput(path.name, "and its mask differ in size", "Give the mask of this very image")
+        sizes = f"{mosaic.width_px}×{mosaic.height_px} px, its mask {shape[1]}×{shape[0]}"
+        raise BadInput(path.name, f"is {sizes}", "Give the mask of this very image")
     return mosaic, remove_patterns.bare(mosaic, PatternSettings())
 
 
@@ -171,9 +172,8 @@ def read_mask(drawn: dict[str, Path], image: Path) -> Mask:
 
 
 def as_table(evaluations: list[Evaluation]) -> Table:
-    table = Table(
-        "method", "tolerance", "precision", "recall", "F1", "95 %", "mean F1", "length found", "true"
-    )
+    headings = "method", "within", "precision", "recall", "F1", "95 %", "mean\nF1", "length\nfound", "true"
+    table = Table(*headings, box=None, pad_edge=False)  # fits the 80 columns of a pipe
     for one in evaluations:
         whole, (low, high) = one.aggregate, one.f1_interval
         table.add_row(

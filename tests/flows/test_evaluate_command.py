@@ -1,10 +1,12 @@
 """`hairline evaluate` on three drawn images, one of them with a mask of another size."""
 
 import json
+import re
 from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
 from artifacts import palette
 from artifacts.evaluation_pictures import MISSED, RIGHT
@@ -23,7 +25,7 @@ def write_cracked(folder: Path, name: str, seed: int) -> None:
     cv2.imwrite(str(folder / "masks" / name), mask)
 
 
-def test_figures_curves_and_the_worst_images(tmp_path: Path) -> None:
+def test_figures_curves_and_the_worst_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for part in ("images", "masks"):
         (tmp_path / part).mkdir()
     for seed, name in enumerate(("a.png", "b.png", "c.png")):
@@ -31,9 +33,14 @@ def test_figures_curves_and_the_worst_images(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "masks" / "c.png"), np.zeros((9, 9), np.uint8))
     out = tmp_path / "out"
     evaluate(tmp_path / "images", tmp_path / "masks", out=out, method=("ridge", "hairline"))
+    table = capsys.readouterr().out
+    assert len(re.findall(r"\d\.\d\d–\d\.\d\d", table)) == 6  # both methods at three tolerances
+    assert max(len(line) for line in table.splitlines() if " px " in line) <= 80
     told = json.loads((out / "evaluation.json").read_text())
     assert told["images"] == 2
-    assert [one["item"] for one in told["left_out"]] == ["c.png"]
+    assert [(one["item"], one["what"]) for one in told["left_out"]] == [
+        ("c.png", "is 256×256 px, its mask 9×9")
+    ]
     ridge = next(one for one in told["results"] if (one["method"], one["tolerance_px"]) == ("ridge", 2))
     assert ridge["aggregate"]["f1"] > 0.9
     assert len(told["curves"]["precision"]) == 255
