@@ -162,6 +162,9 @@ def _summary(session: Session) -> int:
         for arrival in bad:
             table.add_row(_escape(arrival.name), _escape("; ".join(arrival.faults)))
         console.print(table)
+    waiting = [path.name for path in _photos(session.folder) if path.name not in session.judged]
+    if waiting:
+        err.print(f"[yellow]Not judged yet: {_escape(', '.join(waiting))}[/yellow]")
     if session.plan is None:
         return 0
     if not session.missing:

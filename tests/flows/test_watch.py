@@ -155,6 +155,19 @@ def test_interrupted_it_says_what_lacks(tmp_path: Path, capsys: pytest.CaptureFi
     assert "soffit-1" in said.out
 
 
+def test_interrupted_it_names_the_photos_that_it_has_not_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture(0).save(tmp_path / "just-arrived.jpg")
+
+    def interrupted(_: Session) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Session, "arrivals", interrupted)
+    assert watch(tmp_path) == 0
+    assert "Not judged yet: just-arrived.jpg" in capsys.readouterr().err
+
+
 def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no such folder"):
         watch(tmp_path / "nowhere")
