@@ -6,6 +6,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
+from flows.explain import explain
 from schemas.inspection import CameraInput, Inspection
 from schemas.problem import BadInput
 
@@ -18,7 +19,7 @@ def read_inspection(path: Path) -> Inspection:
     try:
         inspection = Inspection.model_validate(content)
     except ValidationError as problem:
-        raise explain(str(path), problem) from None
+        raise explain(str(path), problem, Inspection) from None
     _refuse_photos_given_twice(path, inspection)
     return inspection
 
@@ -70,32 +71,19 @@ def read_camera_file(path: Path) -> CameraInput:
         ) from None
     if isinstance(content, dict) and "camera" in content:
         content = content["camera"]
-    if isinstance(content, str):
-        return read_camera_file(existing(path.parent, content, "camera"))
+        if isinstance(content, str):
+            return read_camera_file(existing(path.parent, content, "camera"))
+    if not isinstance(content, dict):
+        raise BadInput(str(path), "holds no camera", "Write width_px, height_px and focal_px in it")
     try:
         return CameraInput.model_validate(content)
     except ValidationError as problem:
-        raise explain(str(path), problem) from None
-
-
-def explain(item: str, problem: ValidationError) -> BadInput:
-    """A validation error in the words of the person who wrote the file."""
-    first = problem.errors()[0]
-    key = ".".join(str(part) for part in first["loc"]) or "the file"
-    if first["type"] == "extra_forbidden":
-        what, remedy = f"unknown key {key!r}", "Remove it or correct its spelling; README.md lists the keys"
-    elif first["type"] == "missing":
-        what, remedy = f"key {key!r} is missing", "Add it; README.md lists the keys"
-    else:
-        what = f"key {key!r} cannot be {first['input']!r} ({first['msg'].removeprefix('Value error, ')})"
-        remedy = "Correct it; README.md lists the keys"
-    others = problem.error_count() - 1
-    return BadInput(item, what + (f" (and {others} more)" if others else ""), remedy)
+        raise explain(str(path), problem, CameraInput) from None
 
 
 def existing(base: Path, name: str, key: str) -> Path:
     """A file or folder that the inspection names, relative to the inspection file's folder."""
     path = base / name
     if not path.exists():
-        raise BadInput(name, f"named by key {key!r}, does not exist in {base}", "Correct the path")
+        raise BadInput(name, f"named by key {key!r}, does not exist in {base.resolve()}", "Correct the path")
     return path

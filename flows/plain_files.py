@@ -11,7 +11,8 @@ from pydantic import BaseModel, ValidationError
 
 from flows.console import StageLines, err
 from flows.console import out as console
-from flows.inspection_file import explain, read_camera_file
+from flows.explain import explain
+from flows.inspection_file import read_camera_file
 from flows.output_folder import make_output_folder
 from schemas.camera import Camera
 from schemas.control import Control
@@ -52,7 +53,7 @@ def read_contract(path: Path, contract: type[Model]) -> Model:
     except (OSError, UnicodeDecodeError) as problem:
         raise BadInput(str(path), f"cannot be read ({problem})", "Give a JSON file") from None
     except ValidationError as problem:
-        raise explain(str(path), problem) from None
+        raise explain(str(path), problem, contract) from None
 
 
 def read_camera(path: Path) -> Camera:
@@ -70,7 +71,7 @@ def read_control(path: Path) -> Control:
     except (yaml.YAMLError, UnicodeDecodeError):
         raise BadInput(str(path), "is not valid YAML", f"Write {wanted} in it") from None
     except ValidationError as problem:
-        raise explain(str(path), problem) from None
+        raise explain(str(path), problem, Control) from None
 
 
 def one_by_one(

@@ -11,7 +11,7 @@ from rich.table import Table
 from flows.command_line import app
 from flows.console import err
 from flows.console import out as console
-from flows.inspection_file import explain
+from flows.explain import explain
 from flows.option_types import Gsd, Model, Positive, PositiveOrNone, bad_option
 from flows.plain_files import Many, read_camera, read_contract, say, warn, working
 from flows.structure_commands import enter_beside
@@ -187,7 +187,7 @@ def _where(
         return structure.geo_origin(utm_zone and TypeAdapter(UtmZone).validate_python(utm_zone))
     except ValidationError as problem:
         given = "--anchor" if anchors else "--origin" if origin else "--utm-zone"
-        raise explain(given, problem) from None
+        raise explain(given, problem, GeoOrigin) from None
 
 
 def _what_if(
@@ -246,4 +246,4 @@ def _section(path: Path, given: object, contract: type[Model], options: dict[str
     except ValidationError as problem:
         if problem.errors()[0]["loc"][0] in stated:
             raise bad_option(problem) from None
-        raise explain(str(path), problem) from None
+        raise explain(str(path), problem, contract) from None

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from flows.inspection_file import explain, settings_in
+from flows.explain import explain
+from flows.inspection_file import settings_in
 from schemas.contract import Contract
 from schemas.inspection import ScanInput
 from schemas.problem import BadInput
@@ -27,7 +28,7 @@ def read_survey(path: Path, scans: list[Path]) -> Survey:
     try:
         survey = Survey.model_validate({key: content[key] for key in Survey.model_fields if key in content})
     except ValidationError as problem:
-        raise explain(str(path), problem) from None
+        raise explain(str(path), problem, Survey) from None
     given = {scan.name for scan in scans}
     for scan in survey.scans:
         if Path(scan.file).name not in given:

@@ -62,8 +62,25 @@ def test_a_file_that_is_absent_binary_or_a_folder_is_named(tmp_path: Path) -> No
 
 
 def test_a_path_that_does_not_exist_names_its_key(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="named by key 'scans'"):
-        existing(tmp_path, "scan.ply", "scans")
+    with pytest.raises(BadInput, match=f"named by key 'scans', does not exist in {tmp_path.parent}"):
+        existing(tmp_path / "..", "scan.ply", "scans")
+
+
+def test_every_mistake_is_told_with_the_keys_that_may_be_meant(tmp_path: Path) -> None:
+    text = problem_of(tmp_path, "name: a\nphoto: []\ndetect: {methode: magic, size: 3}\nplan: {overlap: 2}\n")
+    assert "unknown key 'photo' (is it 'photos'?)" in text
+    assert "unknown key 'detect.methode' (is it 'method'?)" in text
+    assert "key 'plan.overlap' cannot be 2" in text
+    assert "The keys of detect are method, model, min_score" in text
+    assert "`hairline init`" in text
+    text = problem_of(tmp_path, "name: a\nphotos: [{folder: p, surfaces: x}]\n")
+    assert "unknown key 'photos.0.surfaces' (is it 'surface'?)" in text
+
+
+def test_a_file_without_a_camera_is_named(tmp_path: Path) -> None:
+    (tmp_path / "foo.txt").write_text("hi")
+    with pytest.raises(BadInput, match=r"foo\.txt: holds no camera"):
+        read_camera_file(tmp_path / "foo.txt")
 
 
 def test_the_camera_may_be_a_file_beside(tmp_path: Path) -> None:
