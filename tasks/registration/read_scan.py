@@ -35,7 +35,7 @@ class LoadedScan:
     points_m: Array  # (N, 3) float64, finite
     normals: Array | None  # (N, 3) unit, as the file has them; zeros where it has none
     T_world_scan: Array | None  # (4, 4), maps points_m to the file's world, where the file states a pose
-    viewpoint_m: Array | None  # (3,) scanner in the frame of points_m; None: not known
+    viewpoint_m: Array | None  # (3,) scanner in the frame of points_m; None: the file does not say
     origin_m: Array  # (3,) taken off large coordinates (UTM); zeros for others
 
 
@@ -127,9 +127,9 @@ def _pose_of_shifted(scan: FileScan, unit_m: float, origin_m: Array) -> Array | 
 
 
 def _viewpoint(scan: FileScan, unit_m: float, origin_m: Array) -> Array | None:
-    if scan.viewpoint is not None and scan.viewpoint.any():
-        return np.asarray(scan.viewpoint * unit_m - origin_m)
-    return None if origin_m.any() else np.zeros(3)  # a scanner's own frame starts at the scanner
+    if scan.viewpoint is None or not scan.viewpoint.any():  # zeros are what formats write when they know none
+        return None
+    return np.asarray(scan.viewpoint * unit_m - origin_m)
 
 
 def _reader(path: Path, name: str) -> ModuleType:

@@ -1,7 +1,7 @@
 """A station made ready for registration: its cloud at equal density with normals, at two resolutions."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,8 +9,10 @@ import numpy.typing as npt
 import small_gicp
 from scipy.spatial import cKDTree
 
+from tasks.registration.open_side import to_open_side
 from tasks.registration.read_scan import LoadedScan
 from tasks.registration.rigid_motion import Array
+from tasks.registration.standpoint import likely_standpoint
 from tasks.registration.voxel_grid import Accumulator, unit, voxel_keys, voxel_sums
 
 Floats = npt.NDArray[np.float32]
@@ -21,13 +23,12 @@ SPACING_POINTS = 50_000  # of a cloud tell its spacing
 ALONE = 3.0  # times the usual distance to a neighbour
 FILLED = 4  # points in a coarse voxel on average; fewer are no surface any more
 WORTH_THREADS = 8000  # queries; for fewer, starting threads takes longer than it saves
-STEEP = 0.5  # z of a wall's normal
 
 
 @dataclass(frozen=True)
 class Cloud:
     points_m: Floats  # (N, 3) in the scan's frame
-    normals: Floats  # (N, 3) unit, towards the scanner
+    normals: Floats  # (N, 3) unit, towards the scanner once `turned`
 
     def __len__(self) -> int:
         return len(self.points_m)
@@ -59,7 +60,8 @@ class Cloud:
 
 def fine_cloud(blocks: Iterable[LoadedScan], voxel_m: float) -> tuple[Cloud, LoadedScan, int]:
     """The scan at one point per voxel, its first block, its number of points. Normals are the file's, else
-    those of the plane through the neighbours. No more of the scan than a block is in memory."""
+    those of the plane through the neighbours, of either sign, and the block's are None. No more of the scan
+    than a block is in memory."""
     first: LoadedScan | None = None
     total = Accumulator()
     points = 0
@@ -77,21 +79,23 @@ def fine_cloud(blocks: Iterable[LoadedScan], voxel_m: float) -> tuple[Cloud, Loa
     if stated.any(axis=1).mean() > 0.99:
         normals = stated
     else:
-        normals = _towards(estimated_normals(points_m), points_m, first.viewpoint_m)
+        normals, first = estimated_normals(points_m), replace(first, normals=None)
     return Cloud(points_m.astype(np.float32), normals.astype(np.float32)), first, points
 
 
-def _towards(normals: Array, points_m: Array, scanner_m: Array | None) -> Array:
-    """(N, 3) the normals turned to the scanner; where it is not known, walls to the middle of what it saw,
-    where it likely stood, and all else upwards."""
-    if scanner_m is None:
-        wall = np.abs(normals[:, 2]) < STEEP
-        inwards = np.einsum("ij,ij->i", normals[:, :2], np.median(points_m[:, :2], axis=0) - points_m[:, :2])
-        away = np.where(wall, inwards, normals[:, 2]) < 0
-    else:
-        away = np.einsum("ij,ij->i", normals, scanner_m - points_m) < 0
-    normals[away] *= -1
-    return normals
+def turned(cloud: Cloud, scanner_m: Array | None) -> Cloud:
+    """The cloud with its normals to the scanner; where it is not known, to where it likely stood or, in a
+    cloud of several scanners, to the open side."""
+    points_m, normals = cloud.points_m.astype(np.float64), cloud.normals.astype(np.float64)
+    place_m = likely_standpoint(points_m) if scanner_m is None else scanner_m
+    if place_m is None:
+        return Cloud(cloud.points_m, to_open_side(points_m, normals).astype(np.float32))
+    return Cloud(cloud.points_m, np.where(away_from(place_m, cloud)[:, None], -cloud.normals, cloud.normals))
+
+
+def away_from(place_m: Array, cloud: Cloud) -> npt.NDArray[np.bool_]:
+    """(N,) true for the points whose normals turn away from a (3,) place."""
+    return np.asarray(np.einsum("ij,ij->i", cloud.normals, place_m - cloud.points_m) < 0)
 
 
 def estimated_normals(points_m: Array) -> Array:

@@ -14,8 +14,20 @@ from tasks.registration.cloud_shelf import Shelf, Shelved
 from tasks.registration.feature_match import Features, shape_features
 from tasks.registration.read_scan import LoadedScan
 from tasks.registration.rigid_motion import Array, inverse, pose, transform
-from tasks.registration.station_cloud import Cloud, coarse_cloud, coarse_voxel_m, fine_cloud, on_surfaces
+from tasks.registration.standpoint import standpoint
+from tasks.registration.station_cloud import (
+    Cloud,
+    away_from,
+    coarse_cloud,
+    coarse_voxel_m,
+    fine_cloud,
+    on_surfaces,
+    turned,
+)
 
+MOST_AWAY = (
+    0.1  # of normals that a program turned to (0, 0, 0); where no scanner stood there, they tell no side
+)
 LEAST_POINTS = 100  # fewer, at equal density, are no scan of a structure
 FEATURE_RADII = 5  # coarse voxels
 OVERLAP_POINTS = 20_000  # tell a share of them to half a percent
@@ -62,21 +74,9 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
             f"{len(fine)} points at {voxel_m * 1000:g} mm spacing are too few to register",
             "Scan again, or leave the file out.",
         )
-    prior = None
-    if scan.T_world_scan is not None:  # the crew's word goes before the file's
-        prior = np.array(scan.T_world_scan) @ pose(np.eye(3), loaded.origin_m)
-    elif loaded.T_world_scan is not None:
-        prior = loaded.T_world_scan
-    elif loaded.origin_m.any():  # large coordinates are the world's
-        prior = pose(np.eye(3), loaded.origin_m)
-    scanner_m = loaded.viewpoint_m
-    position_m = None
-    if scan.station_position_m is not None:
-        position_m = np.array(scan.station_position_m)
-        if prior is not None and loaded.origin_m.any():  # the cloud stands in the world, its scanner too
-            scanner_m = transform(inverse(prior), position_m[None])[0]
-    elif prior is not None and scanner_m is not None:
-        position_m = transform(prior, scanner_m[None])[0]
+    prior, scanner_m, position_m = _standing(scan, loaded, fine.points_m.astype(np.float64))
+    if loaded.normals is None or (scanner_m is None and away_from(-loaded.origin_m, fine).mean() < MOST_AWAY):
+        fine = turned(fine, scanner_m)
     coarse_m = coarse_voxel_m(fine, scanner_m)
     if (near := len(on_surfaces(fine, coarse_m))) < LEAST_POINTS:
         raise BadInput(
@@ -96,6 +96,30 @@ def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf)
         points=points,
         targets_m={t.name: np.array(t.position) * scan.unit_m - loaded.origin_m for t in scan.targets},
     )
+
+
+def _standing(
+    scan: Scan, loaded: LoadedScan, points_m: Array
+) -> tuple[Array | None, Array | None, Array | None]:
+    """`prior_T_world_local`, `scanner_m` and `position_m` of a site. What is stated of the scanner counts
+    where it can have seen the points from there."""
+    prior = loaded.T_world_scan
+    if scan.T_world_scan is not None:  # the crew's word goes before the file's
+        prior = np.array(scan.T_world_scan) @ pose(np.eye(3), loaded.origin_m)
+    position_m = None if scan.station_position_m is None else np.array(scan.station_position_m)
+    as_in_world = pose(np.eye(3), loaded.origin_m) if prior is None else prior
+    measured = [] if position_m is None else [transform(inverse(as_in_world), position_m[None])[0]]
+    of_file = [] if loaded.viewpoint_m is None else [loaded.viewpoint_m]
+    scanner_m = standpoint(points_m, [*measured, *of_file])
+    if not loaded.origin_m.any() and (
+        standpoint(points_m, [np.zeros(3)]) is not None or (measured and scanner_m is None)
+    ):  # the scanner's own frame
+        scanner_m = of_file[0] if of_file else np.zeros(3)
+    elif prior is None:  # coordinates of a map or a site are the world's
+        prior = as_in_world
+    if position_m is None and prior is not None and scanner_m is not None:
+        position_m = transform(prior, scanner_m[None])[0]
+    return prior, scanner_m, position_m
 
 
 def shape(site: Site, voxel_m: float) -> Shape:

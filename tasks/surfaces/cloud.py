@@ -22,8 +22,6 @@ _PLY_TYPES = {
 }  # fmt: skip
 LARGEST_M = 10_000.0  # no structure is this long; a wrong unit or a stray point is
 MOST_AWAY = 0.1  # of a station's normals; a grazing view turns a few
-LOOK_DEG = 1.5  # cells of a station's view,
-ONE_RANGE = 0.75  # of all points, in cells of one range; from a scanner's place ≥ 0.82, from others ≤ 0.64
 CHUNK = 4_000_000  # points of a table looked at together
 ALONG = 0.7  # cosine: a normal within 45° of a surface's own
 _NORMAL_NEIGHBOURS = 16  # of a point, when the file has no normals
@@ -47,12 +45,12 @@ class Cloud:
         return Cloud(self.points[chosen], self.normals[chosen], self.views[chosen], self.sides_known)
 
 
-def read_cloud(path: Path, item: str, stations_m: Floats) -> Cloud:
+def read_cloud(path: Path, item: str, scanners_m: Floats) -> Cloud:
     """The cloud of a binary PLY with x y z, and nx ny nz and station where it has them.
 
-    stations_m: (S, 3) scanner positions in the cloud's frame, at least one. A point belongs to the nearest
-    of them where the file does not say. Points come out in an order that depends on their coordinates
-    alone, so that results do too.
+    scanners_m: (S, 3) the stations' scanners in the cloud's frame, at least one; NaN where it is not known.
+    A point belongs to the nearest where the file does not say. Points come out in an order that depends on
+    their coordinates alone, so that results do too.
 
     Raises BadInput, naming `item`, for a file that is no such PLY, is cut short, has no finite point or
     extends over more than LARGEST_M.
@@ -78,47 +76,27 @@ def read_cloud(path: Path, item: str, stations_m: Floats) -> Cloud:
     if {"nx", "ny", "nz"} <= set(names):
         normals = np.column_stack([table[axis] for axis in ("nx", "ny", "nz")]).astype(np.float64)
     else:
-        normals = _estimate_normals(points, stations_m)
+        normals = _estimate_normals(points, scanners_m)
     normals = unit(np.nan_to_num(normals, posinf=0.0, neginf=0.0))
 
-    if "station" in names and int(table["station"].max()) < len(stations_m):
+    if "station" in names and int(table["station"].max()) < len(scanners_m):
         owner = table["station"].astype(np.int64)
     else:
-        owner = cKDTree(stations_m).query(points)[1]
-    views, sides_known = _views(points, normals, owner, stations_m)
-    if sides_known and len(stations_m) == 1 and not _stood_at(points, stations_m[0]):
-        from tasks.surfaces.open_side import to_open_side
-
-        normals = to_open_side(points, normals)
-        return Cloud(points, normals, normals, sides_known=False)
+        owner = _nearest(points, scanners_m)
+    views, sides_known = _views(points, normals, owner, scanners_m)
     return Cloud(points, normals, views, sides_known)
 
 
-def _views(points: Floats, normals: Floats, owner: Indices, stations_m: Floats) -> tuple[Floats, bool]:
+def _views(points: Floats, normals: Floats, owner: Indices, scanners_m: Floats) -> tuple[Floats, bool]:
     """Directions to the points' scanners, and whether all are known. Registration turns normals to the
-    scanner; where many turn away from a station, no scanner stood there (the cloud was merged, mobile or
-    aerial): normals tell the side."""
-    views = unit(stations_m[owner] - points)
+    scanner; where many turn away from it, no scanner stood there (the cloud was merged, mobile or aerial):
+    normals tell the side, as they do where the scanner is not known."""
+    views = unit(scanners_m[owner] - points)
     away = np.einsum("ni,ni->n", normals, views) < 0
-    owned = np.bincount(owner, minlength=len(stations_m))
-    doubted = np.bincount(owner, away, len(stations_m)) > MOST_AWAY * owned
+    owned = np.bincount(owner, minlength=len(scanners_m))
+    doubted = np.bincount(owner, away, len(scanners_m)) > MOST_AWAY * owned
+    doubted |= np.isnan(scanners_m).any(axis=1)
     return np.where(doubted[owner, None], normals, views), not doubted.any()
-
-
-def _stood_at(points: Floats, station_m: Floats) -> bool:
-    """Whether one scanner there can have seen all: from there one sees one range in most directions. A merged
-    cloud has no such place, and its normals were turned to its origin by mistake."""
-    ray = points - station_m
-    range_m = np.linalg.norm(ray, axis=1)
-    level = np.degrees(np.arcsin(np.clip(ray[:, 2] / np.maximum(range_m, 1e-9), -1.0, 1.0)))
-    turn = np.degrees(np.arctan2(ray[:, 1], ray[:, 0]))
-    cell = np.floor(level / LOOK_DEG).astype(np.int64) * 1000 + np.floor(turn / LOOK_DEG).astype(np.int64)
-    order = np.lexsort((range_m, cell))
-    first = np.flatnonzero(np.diff(cell[order], prepend=-(2**62)))
-    end = np.append(first[1:], len(order))
-    nearest_m, farthest_m = range_m[order][first], range_m[order][end - 1]
-    single = farthest_m - nearest_m < 0.1 * nearest_m + 1.0
-    return float((end - first)[single].sum()) >= ONE_RANGE * len(points)
 
 
 def write_points(path: Path, points_m: Floats) -> None:
@@ -187,8 +165,16 @@ def read_table(path: Path, item: str) -> npt.NDArray[np.void]:
     return np.memmap(path, point, "r", start, (count,)) if count else np.zeros(0, point)
 
 
-def _estimate_normals(points: Floats, stations_m: Floats) -> Floats:
-    """Direction of least spread of each point's nearest neighbours, towards the nearest scanner."""
+def _nearest(points: Floats, scanners_m: Floats) -> Indices:
+    """(N,) which of the known scanners is nearest to each point; the first where none is known."""
+    known = np.flatnonzero(~np.isnan(scanners_m).any(axis=1))
+    if not len(known):
+        return np.zeros(len(points), dtype=np.int64)
+    return np.asarray(known[cKDTree(scanners_m[known]).query(points)[1]])
+
+
+def _estimate_normals(points: Floats, scanners_m: Floats) -> Floats:
+    """Direction of least spread of each point's nearest neighbours, towards the nearest known scanner."""
     normals = np.zeros_like(points)
     if len(points) < 3:
         return normals
@@ -199,6 +185,6 @@ def _estimate_normals(points: Floats, stations_m: Floats) -> Floats:
         spread = points[near] - points[near].mean(axis=1, keepdims=True)
         covariance = np.einsum("nki,nkj->nij", spread, spread)
         normals[part] = np.linalg.eigh(covariance)[1][:, :, 0]
-    scanner_m = stations_m[cKDTree(stations_m).query(points)[1]]
+    scanner_m = scanners_m[_nearest(points, scanners_m)]
     normals[np.einsum("ni,ni->n", normals, scanner_m - points) < 0] *= -1
     return normals

@@ -10,20 +10,19 @@ Floats = npt.NDArray[np.float64]
 BIN_DEG = 0.5
 DEEPER = 1.15  # farther than the nearest point of its direction by this factor, and by LEAST_M, is behind it:
 LEAST_M = 0.3  # flat ground seen at a grazing angle is not
+OF_ONE_VIEW = 1e-12  # views are computed alike; normals, which stand for views not known, are never so near
 MOST_HIDDEN = 0.05  # of a station's own points: edges and leaves make up to 2 %, false places 9 % and more
 
 
-def scanners(cloud: Cloud, stations_m: Floats) -> Floats:
-    """(K, 3) of the stations (S, 3), those from which their points can have been seen.
+def scanners(cloud: Cloud, scanners_m: Floats) -> Floats:
+    """(K, 3) of the scanners (S, 3), NaN where not known, those from which their points can have been seen.
 
     The origin of a cloud that was merged elsewhere, or that moved while it scanned, is no scanner's place.
     What was free can only be told from a true one."""
-    if not cloud.sides_known:
-        return np.empty((0, 3))
     believed = []
-    for station in stations_m:
+    for station in scanners_m[~np.isnan(scanners_m).any(axis=1)]:
         towards = unit(station - cloud.points)
-        own = np.einsum("ni,ni->n", towards, cloud.views) > 1 - 1e-6
+        own = np.einsum("ni,ni->n", towards, cloud.views) > 1 - OF_ONE_VIEW
         if own.any() and hidden_share(cloud.points[own] - station) <= MOST_HIDDEN:
             believed.append(station)
     return np.array(believed).reshape(-1, 3)

@@ -50,9 +50,10 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
     from tasks.surfaces.scanners import scanners
 
     shelf = store.current()
-    stations_m = np.array([[row[3] for row in station.T_world_scan[:3]] for station in model.stations])
+    unknown = (np.nan, np.nan, np.nan)
+    scanners_m = np.array([station.scanner_m or unknown for station in model.stations])
     item = "model of " + ", ".join(station.name for station in model.stations)
-    cloud = read_cloud(shelf.path(model.cloud), item, stations_m)
+    cloud = read_cloud(shelf.path(model.cloud), item, scanners_m)
     extraction = extract_structure(cloud, settings, item, progress)
     with shelf.scratch() as folder:
         write_points(folder / "occupied.ply", extraction.occupied_m)
@@ -63,7 +64,7 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
         occupied=occupied,
         min_m=model.min_m,
         max_m=model.max_m,
-        stations_m=tuple((float(e), float(n), float(u)) for e, n, u in scanners(cloud, stations_m)),
+        stations_m=tuple((float(e), float(n), float(u)) for e, n, u in scanners(cloud, scanners_m)),
         world_origin_m=model.origin_m,
         utm_zone=model.utm_zone,
         left_out=model.left_out,

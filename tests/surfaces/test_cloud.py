@@ -6,6 +6,7 @@ import pytest
 
 from schemas.problem import BadInput
 from tasks.surfaces.cloud import read_cloud, write_points
+from tasks.surfaces.scanners import scanners
 
 HEADER = b"ply\nformat binary_little_endian 1.0\n"
 STATIONS_M = np.array([[0.0, 0.0, 10.0], [0.0, 0.0, -10.0]])
@@ -44,6 +45,17 @@ def test_normals_tell_the_side_where_no_scanner_stood(tmp_path: Path) -> None:
     cloud = read_cloud(path, "a", STATIONS_M[:1])
     np.testing.assert_allclose(cloud.views, [[0.0, 0.0, -1.0]] * 100)
     assert not cloud.sides_known
+
+
+def test_a_known_scanner_counts_beside_one_that_is_not_known(tmp_path: Path) -> None:
+    columns = flat(100) | {"nx": 0.0, "ny": 0.0, "nz": np.repeat([1.0, -1.0], 50)}
+    columns |= {"station": np.repeat([0, 1], 50)}
+    path = write_ply(tmp_path / "a.ply", columns, {"station": "uchar"})
+    scanners_m = np.array([STATIONS_M[0], [np.nan] * 3])
+    cloud = read_cloud(path, "a", scanners_m)
+    assert not cloud.sides_known
+    np.testing.assert_array_equal(np.sign(cloud.views[:, 2]), np.sign(cloud.normals[:, 2]))
+    np.testing.assert_array_equal(scanners(cloud, scanners_m), STATIONS_M[:1])
 
 
 def test_normals_are_estimated_where_the_file_has_none(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def model_of(points: npt.NDArray[np.float64], path: Path) -> RegisteredModel:
     """One station at the origin, no normals: the least that a model can say."""
     cloud = store.current().put(write_ply(path, dict(zip("xyz", points.T, strict=True))))
     low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    station = Station(name="s1", T_world_scan=UNMOVED, points=len(points))
+    station = Station(name="s1", T_world_scan=UNMOVED, points=len(points), scanner_m=(0.0, 0.0, 0.0))
     return RegisteredModel(cloud=cloud, stations=(station,), points=len(points), min_m=low, max_m=high)
 
 

@@ -1,8 +1,6 @@
 import numpy as np
 
-from tasks.surfaces.cloud import _stood_at
-from tasks.surfaces.open_side import to_open_side
-from tests.surfaces.scanner import Box, scan
+from tasks.registration.open_side import to_open_side
 
 RNG = np.random.default_rng(0)
 
@@ -34,12 +32,3 @@ def test_a_house_is_seen_from_outside_and_its_roof_from_above() -> None:
     normals = np.repeat([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]], [len(w) for w in walls], axis=0)
     roof = to_open_side(points, normals)[-len(walls[2]) :]
     assert (roof[:, 2] > 0).mean() > 0.95
-
-
-def test_a_scan_has_one_range_a_direction_and_merged_scans_have_many() -> None:
-    boxes = [Box((-3.0, 4.0, 0.0), (3.0, 5.0, 4.0)), Box((-20.0, -20.0, -0.5), (20.0, 20.0, 0.0))]
-    stations = [(-6.0, 0.0, 1.7), (6.0, 1.0, 1.7), (0.0, 12.0, 1.7)]
-    alone = scan(boxes, stations[:1], step_deg=1.0)
-    merged = scan(boxes, stations, step_deg=1.0)
-    assert _stood_at(alone.points, np.array(stations[0]))
-    assert not _stood_at(merged.points, np.array([0.0, 0.0, 0.0]))

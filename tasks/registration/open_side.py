@@ -9,8 +9,8 @@ from the one that meets nothing, else from the longer one; else level places fro
 import numba
 import numpy as np
 
-from tasks.surfaces.cloud import Floats, Indices
-from tasks.surfaces.voxels import group_means, voxel_keys
+from tasks.registration.rigid_motion import Array
+from tasks.registration.voxel_grid import Indices, unit, voxel_keys, voxel_sums
 
 TOLD_M = 0.25  # places this near that lie alike are judged as one
 CELL_M = 0.1
@@ -21,14 +21,15 @@ LEVEL_COSINE = float(np.cos(np.radians(45.0)))
 SAME_M = 0.2  # ways that differ by less are alike
 
 
-def to_open_side(points_m: Floats, normals: Floats) -> Floats:
+def to_open_side(points_m: Array, normals: Array) -> Array:
     """(N, 3) normals, each turned to the side it was seen from, as far as the points tell."""
     axis = np.abs(normals).argmax(axis=1)
     positive = np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0
     alike = normals * np.where(positive, 1.0, -1.0)[:, None]
-    group = np.unique(voxel_keys(points_m, TOLD_M) * 3 + axis, return_inverse=True)[1]
-    places_m, facing = group_means(points_m, group), group_means(alike, group)
-    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-12)
+    keys = voxel_keys(points_m, TOLD_M, axis)
+    group = np.unique(keys, return_inverse=True)[1]
+    means = voxel_sums(keys, np.hstack([points_m, alike])).means
+    places_m, facing = means[:, :3], unit(means[:, 3:])
 
     low = points_m.min(axis=0) - FARTHEST_M - 2 * CELL_M
     shape = np.ceil((points_m.max(axis=0) + FARTHEST_M + 2 * CELL_M - low) / CELL_M).astype(np.int64)
@@ -43,7 +44,7 @@ def to_open_side(points_m: Floats, normals: Floats) -> Floats:
     return np.asarray(alike * np.where(sign[group], 1.0, -1.0)[:, None])
 
 
-def _likely(free_m: Floats) -> Floats:
+def _likely(free_m: Array) -> Array:
     """Larger for the likelier way: within a structure's thickness the longer, then nothing, then something
     beyond."""
     beyond = np.where(free_m < FARTHEST_M, THICK_M + 1.0 + free_m, THICK_M)
@@ -51,7 +52,7 @@ def _likely(free_m: Floats) -> Floats:
 
 
 @numba.njit(cache=True)
-def _free_m(points: Floats, directions: Floats, occupied: Indices, strides: Indices) -> Floats:
+def _free_m(points: Array, directions: Array, occupied: Indices, strides: Indices) -> Array:
     free = np.full(len(points), FARTHEST_M)
     for n in range(len(points)):
         along = SKIN_M
