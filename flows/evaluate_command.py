@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
@@ -16,14 +16,10 @@ from flows.option_types import Gsd
 from flows.photo_commands import Method
 from flows.plain_files import OutFolder, photos_in, warn, working
 from schemas.detection import Patterns
-from schemas.evaluation import Curves, Evaluation
+from schemas.evaluation import Curves, Evaluation, Levels, Tally
 from schemas.mosaic import Mosaic
 from schemas.problem import BadInput, LeftOut
 from schemas.settings import DetectSettings
-
-if TYPE_CHECKING:
-    from tasks.assessment.curves import Levels
-    from tasks.assessment.evaluation import Tally
 
 Mask = npt.NDArray[np.bool_]
 

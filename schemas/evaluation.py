@@ -1,6 +1,30 @@
 """How well found cracks agree with masks drawn by people."""
 
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
 from schemas.contract import Contract, Vector2
+
+Levels = npt.NDArray[np.int64]  # (4, 256) pixels of each level: all, true, near truth; truth by what is near
+
+
+class Counts(NamedTuple):
+    """Pixels of one image, or summed over many."""
+
+    found_right: int
+    found: int
+    true_found: int
+    true: int
+
+
+class Tally(NamedTuple):
+    """Of one image: all that an evaluation needs of it, so that its masks need not be kept."""
+
+    areas: tuple[Counts, ...]  # at each tolerance
+    lines: tuple[Counts, ...]
+    pixels: int
 
 
 class Scores(Contract):

@@ -7,11 +7,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from schemas.evaluation import Curves
+from schemas.evaluation import Curves, Levels
 from tasks.assessment.evaluation import Mask, disc, near
 
 Probability = npt.NDArray[np.uint8]  # (H, W), 255 × the probability
-Levels = npt.NDArray[np.int64]  # (4, 256) pixels of each level: all, true, near truth; truth by what is near
 
 BINS = 10  # of the calibration
 

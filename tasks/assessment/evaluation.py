@@ -7,28 +7,18 @@ other's: that is length found and length false, which an engineer reads.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from schemas.evaluation import Evaluation, Scores
+from schemas.evaluation import Counts, Evaluation, Scores, Tally
 
 TOLERANCES_PX = (0, 2, 5)
 DRAWN_ANEW = 1000  # bootstrap samples
 SEED = 0
 
 Mask = npt.NDArray[np.bool_]
-
-
-class Counts(NamedTuple):
-    """Pixels of one image, or summed over many."""
-
-    found_right: int
-    found: int
-    true_found: int
-    true: int
 
 
 def count(found: Mask, truth: Mask, tolerance_px: int) -> Counts:
@@ -54,14 +44,6 @@ def scores(counts: Counts) -> Scores:
     recall = counts.true_found / counts.true if counts.true else 0.0
     both = precision + recall
     return Scores(precision=precision, recall=recall, f1=2 * precision * recall / both if both else 0.0)
-
-
-class Tally(NamedTuple):
-    """Of one image: all that an evaluation needs of it, so that its masks need not be kept."""
-
-    areas: tuple[Counts, ...]  # at each tolerance
-    lines: tuple[Counts, ...]
-    pixels: int
 
 
 def tally(found: Mask, truth: Mask) -> Tally:

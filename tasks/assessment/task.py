@@ -9,7 +9,7 @@ from artifacts.page import Page
 from schemas.crack import Measurement
 from schemas.crack_report import CrackReport
 from schemas.detection import Detection, Patterns
-from schemas.evaluation import Curves, Evaluation
+from schemas.evaluation import Curves, Evaluation, Levels, Tally
 from schemas.file import Folder
 from schemas.flight_log import FlightLog
 from schemas.flight_plan import FlightPlan
@@ -23,8 +23,8 @@ from schemas.surface import Surface
 from tasks.stage import stage
 
 if TYPE_CHECKING:
-    from tasks.assessment.curves import Levels, Probability
-    from tasks.assessment.evaluation import Mask, Tally
+    from tasks.assessment.curves import Probability
+    from tasks.assessment.evaluation import Mask
 
 
 def pages(inputs: Mapping[str, Any], result: CrackReport) -> list[Page]:
@@ -60,35 +60,35 @@ def assess(
     return report_of(inspection, method, mosaics, measurements, patterns, surfaces, left_out, settings)
 
 
-def tally(found: "Mask", truth: "Mask") -> "Tally":
+def tally(found: "Mask", truth: "Mask") -> Tally:
     """Agreement of a found and a drawn mask, (H, W) bool; no stage: only the command line asks for it."""
     from tasks.assessment.evaluation import tally as tally_masks
 
     return tally_masks(found, truth)
 
 
-def evaluate(method: str, images: "Sequence[Tally]") -> tuple[Evaluation, ...]:
+def evaluate(method: str, images: Sequence[Tally]) -> tuple[Evaluation, ...]:
     """A method's agreement over all images, at each tolerance."""
     from tasks.assessment.evaluation import evaluate as evaluate_tallies
 
     return evaluate_tallies(method, images)
 
 
-def levels(probability: "Probability", truth: "Mask", tolerance_px: int) -> "Levels":
+def levels(probability: "Probability", truth: "Mask", tolerance_px: int) -> Levels:
     """What `curves` needs of one image; levels of several images add up."""
     from tasks.assessment.curves import levels as levels_of
 
     return levels_of(probability, truth, tolerance_px)
 
 
-def curves(of_all: "Levels", tolerance_px: int) -> Curves:
+def curves(of_all: Levels, tolerance_px: int) -> Curves:
     """Precision, recall and calibration of a network's probabilities."""
     from tasks.assessment.curves import curves as curves_of
 
     return curves_of(of_all, tolerance_px)
 
 
-def f1_of(one: "Tally", tolerance_px: int) -> float:
+def f1_of(one: Tally, tolerance_px: int) -> float:
     """Of one image."""
     from tasks.assessment.evaluation import TOLERANCES_PX, scores
 
