@@ -35,8 +35,8 @@ class Components(NamedTuple):
         nobody sees how long it is: there less is enough."""
         x, y, width, height = self.boxes.T
         high, wide = self.labels.shape
-        sides = (x == 0).astype(int) + (y == 0) + (x + width == wide) + (y + height == high)
-        return np.asarray(self.elongation >= np.where(sides >= 2, THROUGH, ELONGATION))
+        through = ((x == 0) & (width == wide)) | ((y == 0) & (height == high))
+        return np.asarray(self.elongation >= np.where(through, THROUGH, ELONGATION))
 
     def box(self, label: int) -> tuple[int, int, int, int]:
         x, y, width, height = (int(n) for n in self.boxes[label])
