@@ -87,8 +87,9 @@ def collect(
     if planned is not None:
         save_plan(planned)
     if inspection.flight is None or planned is None:
-        given = tuple(given_photos(inspection, base, None))
-        return Collected(planned, None, given, _unused(inspection, structure), surfaces)
+        given, unreadable = given_photos(inspection, base, None)
+        unused = _unused(inspection, structure)
+        return Collected(planned, None, tuple(given), (*unreadable, *unused), surfaces)
     if inspection.flight == "external":
         photo_sets, paths = photos_and_logs(inspection, base)
         inspection = inspection.model_copy(update={"photos": photo_sets})
@@ -97,8 +98,12 @@ def collect(
     else:
         log = _flown(inspection, planned)
     simulated = inspection.simulation is not None and inspection.flight == "simulated"
-    photos = _simulated_photos(inspection, planned, log) if simulated else given_photos(inspection, base, log)
-    return Collected(planned, log, tuple(photos), _missed(log), surfaces)
+    photos, unreadable = (
+        (_simulated_photos(inspection, planned, log), [])
+        if simulated
+        else given_photos(inspection, base, log)
+    )
+    return Collected(planned, log, tuple(photos), (*unreadable, *_missed(log)), surfaces)
 
 
 def _unused(inspection: Inspection, structure: Structure | None) -> tuple[LeftOut, ...]:

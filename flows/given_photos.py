@@ -12,7 +12,7 @@ from schemas.contract import Vector3
 from schemas.file import File, FolderEntry
 from schemas.flight_log import FlightLog
 from schemas.inspection import Inspection, PhotoSet
-from schemas.problem import BadInput
+from schemas.problem import BadInput, LeftOut
 from tasks.photos.task import assign
 
 PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".heic", ".heif"}
@@ -33,19 +33,27 @@ class PhotoSource:
     velocity_m_s: Vector3 | None = None
 
 
-def given_photos(inspection: Inspection, base: Path, log: FlightLog | None) -> list[PhotoSource]:
-    """The photos in the inspection's folders; those of a logged flight with their surface and pose.
+def given_photos(
+    inspection: Inspection, base: Path, log: FlightLog | None
+) -> tuple[list[PhotoSource], list[LeftOut]]:
+    """The photos in the inspection's folders; those of a logged flight with their surface and pose. And the
+    files that cannot be read; BadInput where none can.
 
     A photo is called by its file's name; where several folders have one of that name, by folder/name."""
     camera = inspection.camera.camera() if inspection.camera else None
     folders = [existing(base, photo_set.folder, "photos").resolve() for photo_set in inspection.photos]
     paths = [_photos_in(folder, s.folder) for folder, s in zip(folders, inspection.photos, strict=True)]
     bearers = Counter(path.name for of_folder in paths for path in of_folder)
-    found = [
-        (photo_set, f"{label}/{path.name}", path, store.current().put(path))
-        for photo_set, label, of_folder in zip(inspection.photos, _labels(folders), paths, strict=True)
-        for path in of_folder
-    ]
+    found: list[tuple[PhotoSet, str, Path, File]] = []
+    problems: list[BadInput] = []
+    for photo_set, label, of_folder in zip(inspection.photos, _labels(folders), paths, strict=True):
+        for path in of_folder:
+            try:
+                found.append((photo_set, f"{label}/{path.name}", path, store.current().put(path)))
+            except BadInput as problem:
+                problems.append(problem)
+    if problems and not found:
+        raise problems[0]
     flown = [FolderEntry(name=name, file=file) for s, name, _, file in found if s.surface is None]
     shots = {a.name: a.shot for a in assign(tuple(flown), log)} if log is not None and flown else {}
     sources = []
@@ -64,7 +72,7 @@ def given_photos(inspection: Inspection, base: Path, log: FlightLog | None) -> l
                 velocity_m_s=shot.velocity_m_s if shot else None,
             )
         )
-    return sources
+    return sources, [LeftOut.because("photos", problem) for problem in problems]
 
 
 def position_sigma_m(inspection: Inspection) -> float:

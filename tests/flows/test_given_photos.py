@@ -29,7 +29,7 @@ def photo(path: Path, grey: int, taken: str | None = None) -> None:
 
 
 def given(base: Path, *sets: PhotoSet, log: FlightLog | None = None) -> list[PhotoSource]:
-    return given_photos(Inspection(name="two-cards", photos=sets), base, log)
+    return given_photos(Inspection(name="two-cards", photos=sets), base, log)[0]
 
 
 def test_photos_of_two_cards_are_told_apart_by_their_folders(tmp_path: Path) -> None:
