@@ -15,6 +15,9 @@ UtmZone = Annotated[str, Field(pattern=r"^([1-9]|[1-5][0-9]|60)[NS]$")]  # such 
 CENTRAL_SCALE = 0.9996
 FALSE_EAST_M, FALSE_NORTH_M = 500_000.0, 10_000_000.0  # the latter in the south
 EAST_M, NORTH_M = (100_000.0, 900_000.0), (0.0, 10_000_000.0)  # of every zone
+_ZONES_OF_EPSG = {
+    326: ("N", range(1, 61)), 327: ("S", range(1, 61)), 258: ("N", range(28, 39)), 269: ("N", range(1, 24)),
+}  # fmt: skip
 _N = (1 - math.sqrt(1 - ECCENTRICITY_SQUARED)) / (1 + math.sqrt(1 - ECCENTRICITY_SQUARED))
 _RADIUS_M = SEMI_MAJOR_M / (1 + _N) * (1 + _N**2 / 4 + _N**4 / 64)
 _BETA = (
@@ -69,6 +72,7 @@ def zone_in(crs: str) -> str | None:
 
 
 def zone_of_epsg(code: int) -> str | None:
-    """WGS84 (326…, 327…), ETRS89 (258…) and NAD83 (269…): within a metre of each other."""
-    hemisphere = {326: "N", 327: "S", 258: "N", 269: "N"}.get(code // 100)
-    return f"{code % 100}{hemisphere}" if hemisphere and 1 <= code % 100 <= 60 else None
+    """WGS84 (326…, 327…), ETRS89 (258…) and NAD83 (269…): within a metre of each other. NAD83's further
+    numbers are state planes."""
+    hemisphere, zones = _ZONES_OF_EPSG.get(code // 100, ("", range(0)))
+    return f"{code % 100}{hemisphere}" if code % 100 in zones else None

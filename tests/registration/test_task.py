@@ -1,5 +1,6 @@
 """The stages of registration: files in, model out."""
 
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from laspy.vlrs.known import WktCoordinateSystemVlr
 
 from artifacts import store
 from schemas.problem import BadInput
+from schemas.scan import Scan
 from schemas.settings import RegistrationSettings, SurfaceSettings
 from schemas.utm import utm_origin
 from tasks.registration.read_scan import read_scan
@@ -92,6 +94,30 @@ def test_scans_in_utm_say_where_on_earth_the_model_lies(site_folder: Path, tmp_p
     # in the datum of control targets, nobody knows the zone
     here = model.model_copy(update={"utm_zone": None})
     assert extract.bare(here, SurfaceSettings()).geo_origin() is None
+
+
+def test_a_state_plane_says_its_unit_by_its_number(tmp_path: Path) -> None:
+    """New York Long Island in survey feet, 300 of them a side; California zone 3 is in metres, and no UTM
+    zone; New York of 2011 may be either."""
+    points = np.random.default_rng(0).uniform(0, 300, (5000, 3)) + np.array([980_000, 190_000, 0])
+
+    def ingested(code: int, unit_m: float = 1.0) -> Scan:
+        header = laspy.LasHeader(point_format=3, version="1.2")
+        header.offsets, header.scales = points.min(axis=0), np.full(3, 0.01)
+        keys = struct.pack("<12H", 1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, code)
+        header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", keys))
+        las = laspy.LasData(header)
+        las.x, las.y, las.z = points.T
+        las.write(tmp_path / f"{code}.las")
+        file = store.current().put(tmp_path / f"{code}.las")
+        return ingest_scan.bare(file, str(code), unit_m, None, None)[0]
+
+    assert ingested(2263).unit_m == pytest.approx(1200 / 3937, abs=1e-9)
+    assert (ingested(26943).unit_m, ingested(26943).utm_zone) == (1.0, None)
+    assert (ingested(26910).unit_m, ingested(26910).utm_zone) == (1.0, "10N")
+    with pytest.raises(BadInput, match="6539: it states the state plane EPSG:6539 without a unit"):
+        ingested(6539)
+    assert ingested(6539, 0.3048).unit_m == 0.3048
 
 
 def _las(path: Path, points_m: Array, system: str) -> Path:

@@ -55,3 +55,8 @@ def test_zones_as_files_state_them() -> None:
     assert [zone_of_epsg(code) for code in (32632, 32756, 25833, 26917, 32661, 2193)] == [
         "32N", "56S", "33N", "17N", None, None,
     ]  # fmt: skip
+    state_planes, others = (26929, 26943, 26960), (26924, 25827, 25839, 32600)
+    assert [zone_of_epsg(code) for code in (*state_planes, *others)] == [None] * 7
+    assert [zone_of_epsg(code) for code in (26901, 26923, 25828, 25838)] == [
+        "1N", "23N", "28N", "38N",
+    ]  # fmt: skip

@@ -13,6 +13,8 @@ from schemas.utm import zone_in, zone_of_epsg
 from tasks.registration.readers.file_scan import BLOCK, FileScan, Unreadable
 
 UNIT_OF_GEOKEY_M = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}  # EPSG: metre, foot, US survey foot
+STATE_PLANES_IN_FEET = (range(2222, 2290), range(2867, 2931), range(26729, 26814), range(32001, 32059))
+STATE_PLANES_IN_EITHER = (range(3465, 3554), range(6355, 6628))  # EPSG's, feet and metres by turns
 LINEAR_UNITS_KEY = 3076  # GeoTIFF ProjLinearUnitsGeoKey
 PROJECTED_SYSTEM_KEY = 3072  # GeoTIFF ProjectedCSTypeGeoKey
 MOST_PACKED = 1000  # times; real points pack to a tenth
@@ -35,7 +37,11 @@ def read(path: Path, index: int) -> Iterator[FileScan]:
 
 
 def stated_unit_m(path: Path) -> float | None:
-    """Metres per unit as the file's coordinate system states it; None where it states none that we know."""
+    """Metres per unit as the file's coordinate system states it, or has it by its EPSG number alone; None
+    where it states none that we know. Raises Unreadable for a number that leaves feet and metres open.
+
+    The two feet are 2 ppm apart, 0.1 mm in 50 m: the survey foot stands for both where the number says feet.
+    """
     with _opened(path) as las:
         records = las.header.vlrs
     for record in records:
@@ -46,7 +52,14 @@ def stated_unit_m(path: Path) -> float | None:
         for key in getattr(record, "geo_keys", ()):
             if key.id == LINEAR_UNITS_KEY and key.value_offset in UNIT_OF_GEOKEY_M:
                 return UNIT_OF_GEOKEY_M[key.value_offset]
-    return None
+    keys = (key for record in records for key in getattr(record, "geo_keys", ()))
+    system = next((key.value_offset for key in keys if key.id == PROJECTED_SYSTEM_KEY), 0)
+    if any(system in codes for codes in STATE_PLANES_IN_EITHER):
+        raise Unreadable(
+            f"it states the state plane EPSG:{system} without a unit, feet or metres: give `unit: ft`, or,"
+            " where they are metres, export it with the unit in its header"
+        )
+    return UNIT_OF_GEOKEY_M[9003] if any(system in codes for codes in STATE_PLANES_IN_FEET) else None
 
 
 def stated_utm_zone(path: Path) -> str | None:
