@@ -78,6 +78,7 @@ def test_ply_keeps_float64_of_large_coordinates(tmp_path: Path) -> None:
         ("names.csv", "a,b,c\n1,2,3\n", "columns x, y, z"),
         ("empty.xyz", "", "no points"),
         ("nan.xyz", "nan nan nan\nnan 1 2\n", "NaN"),
+        ("short.xyz", "5\n1 2 3\n4 5 6\n", "cut short: 5 points are announced and 2 follow"),
         ("short.pts", "5\n1 2 3\n4 5 6\n", "cut short: 5 points"),
         ("bad.pcd", "1 2 3\n", "no PCD header"),
         ("bad.e57", "ASTM-E57 and no more", "libE57 refuses it"),
@@ -118,9 +119,23 @@ def test_xyz_and_csv_dialects(tmp_path: Path) -> None:
         ("quoted.csv", '"x [m]" , "y [m]" , "z [m]"\n' + rows(POINTS, " , "), False),
         ("comma.csv", "x;y;z\n" + rows(POINTS, ";").replace(".", ","), False),
         ("bare.csv", rows(POINTS, ";").replace(".", ","), False),
+        ("tabs.xyz", rows(POINTS, "\t").replace(".", ","), False),
+        ("tabs.txt", "X\tY\tZ\n" + rows(POINTS, "\t").replace(".", ","), False),
+        ("whole.csv", "1, 2, 3\n" + rows(POINTS, ", "), False),
+        ("mark.csv", "\ufeffX,Y,Z\n" + rows(POINTS, ","), False),
+        ("mark.pts", "\ufeff4\n" + rows(POINTS), False),
+        (
+            "latin.csv",
+            "x,y,z,Höhe\n".encode("latin-1") + rows(np.hstack([POINTS, POINTS]), ",").encode(),
+            False,
+        ),
+        ("count.xyz", "4\n" + rows(POINTS), False),
+        ("survey.csv", "Easting,Northing,Elevation,Intensity\n" + rows(POINTS, ","), False),
+        ("both.csv", "Height,x,y,z\n" + rows(np.hstack([POINTS[:, 2:] + 9, POINTS]), ","), False),
     ):
         scan = read_scan(written(tmp_path, name, content))
-        assert np.allclose(scan.points_m, POINTS), name
+        assert np.allclose(scan.points_m[-4:], POINTS), name
+        assert len(scan.points_m) == 4 + (name == "whole.csv"), name
         assert (scan.normals is not None) == has_normals, name
 
 

@@ -14,7 +14,7 @@ def count(path: Path) -> int:
 
 def read(path: Path, index: int) -> Iterator[FileScan]:
     """Coordinates are those of the project, not of a scanner."""
-    with path.open(encoding="utf-8") as text:
+    with path.open(encoding="utf-8-sig") as text:
         lines = (line for line in map(plain, text) if line.strip())
         first = next(lines, "")
         if len(first.split()) >= 3:  # some programs leave the count out
