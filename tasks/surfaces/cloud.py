@@ -20,7 +20,9 @@ _PLY_TYPES = {
     "int": "<i4", "int32": "<i4", "uint": "<u4", "uint32": "<u4",
     "float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8",
 }  # fmt: skip
-LARGEST_M = 10_000.0  # no structure is this long; a wrong unit or a stray point is
+LARGEST_M = 10_000.0  # no structure is this long; in a wrong unit it is
+BULK = (1, 99)  # percent of the points, between which the structure lies,
+FEWEST = 1000  # where there are so many
 MOST_AWAY = 0.1  # of a station's normals; a grazing view turns a few
 CHUNK = 4_000_000  # points of a table looked at together
 ALONG = 0.7  # cosine: a normal within 45° of a surface's own
@@ -52,8 +54,8 @@ def read_cloud(path: Path, item: str, scanners_m: Floats) -> Cloud:
     A point belongs to the nearest where the file does not say. Points come out in an order that depends on
     their coordinates alone, so that results do too.
 
-    Raises BadInput, naming `item`, for a file that is no such PLY, is cut short, has no finite point or
-    extends over more than LARGEST_M.
+    A few points far off are left out. Raises BadInput, naming `item`, for a file that is no such PLY, is cut
+    short, has no finite point or whose bulk extends over more than LARGEST_M.
     """
     table = read_table(path, item)
     points = np.column_stack([table[axis] for axis in "xyz"]).astype(np.float64)
@@ -64,13 +66,16 @@ def read_cloud(path: Path, item: str, scanners_m: Floats) -> Cloud:
             item, "the cloud has no point with finite coordinates", "Check the scans it was made of"
         )
     table, points = table[order], points[order]
-    extent_m = float(np.ptp(points, axis=0).max())
+    shares = BULK if len(points) >= FEWEST else (0, 100)
+    extent_m = float(np.ptp(np.percentile(points, shares, axis=0), axis=0).max())
     if extent_m > LARGEST_M:
         raise BadInput(
             item,
             f"the cloud extends over {extent_m / 1000:.0f} km",
             "State the unit of the scans (`unit: mm`?) or remove the stray points",
         )
+    near = (np.abs(points - np.median(points, axis=0)) < LARGEST_M).all(axis=1)  # without lone echoes far off
+    table, points = table[near], points[near]
 
     names = table.dtype.names or ()
     if {"nx", "ny", "nz"} <= set(names):

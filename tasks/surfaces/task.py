@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from artifacts import store
 from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of
+from schemas.contract import Vector3
 from schemas.raster import Pixels
 from schemas.registered_model import RegisteredModel
 from schemas.relief import Relief
@@ -62,13 +64,18 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
         surfaces=extraction.surfaces,
         obstacles=extraction.obstacles,
         occupied=occupied,
-        min_m=model.min_m,
-        max_m=model.max_m,
-        stations_m=tuple((float(e), float(n), float(u)) for e, n, u in scanners(cloud, scanners_m)),
+        min_m=_triple(cloud.points.min(axis=0)),
+        max_m=_triple(cloud.points.max(axis=0)),
+        stations_m=tuple(_triple(place_m) for place_m in scanners(cloud, scanners_m)),
         world_origin_m=model.origin_m,
         utm_zone=model.utm_zone,
         left_out=model.left_out,
     )
+
+
+def _triple(place_m: npt.NDArray[np.float64]) -> Vector3:
+    east, north, up = place_m.tolist()
+    return east, north, up
 
 
 def relief_pages(inputs: Mapping[str, Any], reliefs: tuple[Relief, ...]) -> list[Page]:

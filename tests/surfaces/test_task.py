@@ -12,6 +12,7 @@ from schemas.problem import BadInput
 from schemas.registered_model import RegisteredModel, Station
 from schemas.settings import SurfaceSettings
 from schemas.structure import Structure
+from tasks.surfaces.cloud import read_cloud
 from tasks.surfaces.task import extract, measure_relief, pages, relief_pages
 from tests.development_data import development_data
 from tests.surfaces.scanner import Box, scan
@@ -48,6 +49,15 @@ def test_a_wall_from_file_to_structure(wall: RegisteredModel, shelf: store.Store
     occupied = o3d.io.read_point_cloud(str(shelf.path(structure.occupied)))
     assert np.asarray(occupied.points)[:, 1] == pytest.approx(5.0, abs=0.02)
     assert Structure.model_validate_json(structure.model_dump_json()) == structure
+
+
+def test_a_few_echoes_far_off_are_no_part_of_the_model(wall: RegisteredModel, tmp_path: Path) -> None:
+    points = read_cloud(store.current().path(wall.cloud), "wall", np.zeros((1, 3))).points
+    far_m = np.array([[11_000.0, 0.0, 0.0], [0.0, -30_000.0, 500.0]])
+    clean = extract.bare(wall, SurfaceSettings())
+    with_echoes = extract.bare(model_of(np.vstack([points, far_m]), tmp_path / "far.ply"), SurfaceSettings())
+    assert with_echoes.surfaces == clean.surfaces
+    assert (with_echoes.min_m, with_echoes.max_m) == (clean.min_m, clean.max_m)
 
 
 def test_the_result_is_the_same_bytes_again(wall: RegisteredModel) -> None:
