@@ -17,6 +17,8 @@ from tasks.measurement.profiles import STEP_PX, Profiles
 
 WIDE_SIGMAS = 5.0  # from here w and D are told apart in each profile
 UNRESOLVED_SIGMAS = 2.0  # below this, unanchored, only an upper bound
+PALE = 0.5  # of the crack's darkness: what looks wide but paler is noise,
+PALE_SURE = 2.0  # unless so many times a profile's usual error say that the crack is filled there
 ANCHORS = 10  # so many wide profiles make an anchor
 DARKEST = 1.0  # no crack returns less than no light
 SHIFTS_PX = np.arange(-1.5, 1.51, 0.25)  # the profile's centre about the centreline
@@ -59,9 +61,12 @@ def measure_widths(offsets_px: Values, darkness: Profiles, psf_px: float) -> Wid
     best = apart.argmin(axis=1)
     rows = np.arange(len(darkness))
     wide = widths[best] >= WIDE_SIGMAS * psf_px
-    shared, spread, anchored = _shared_darkness(match, free[rows, best][wide])
-    wide &= anchored
+    told = free[rows, best]
+    shared, spread, anchored = _shared_darkness(match, told[wide])
     together = _residual(match, np.full_like(free, shared))
+    usual = float(np.median(apart[rows, best]))  # of a profile's squared error
+    surely = together.min(axis=1) - apart[rows, best] > PALE_SURE * usual
+    wide &= anchored & ((told > PALE * shared) | surely)
     width = np.where(wide, _refined(widths, apart), _refined(widths, together))
     noise = np.sqrt(apart[rows, best] / max(len(offsets_px) - 4, 1) * OVERSAMPLED)
     sigma = np.where(wide, 0.0, width * spread / shared)  # an error of D is one of w

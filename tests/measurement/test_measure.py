@@ -53,6 +53,29 @@ def test_a_thin_crack_as_jagged_as_real_ones_is_not_taken_for_a_wide_pale_one(
     assert unresolved or found == pytest.approx(width, abs=0.5)
 
 
+@pytest.mark.parametrize("width", [3.0, 6.0])
+def test_no_end_of_a_crack_looks_wider_than_its_middle(width: float) -> None:
+    """Where it tapers to nothing a profile is noise, and fits a wide and pale crack as well as none."""
+    for seed in (700, 701, 702):
+        wall = cracked_wall(seed, width, 10.0)
+        known = cv2.dilate(wall.truth.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        (crack, *_) = sorted(
+            measure_cracks(ArrayRaster(wall.rgb), known, 30, 15).cracks, key=lambda one: -one.length_px
+        )
+        assert np.quantile(crack.widths.width_px, 0.99) < 1.6 * np.median(crack.widths.width_px) + 0.5
+
+
+def test_a_stretch_that_is_filled_keeps_its_width() -> None:
+    """A third as dark as the rest."""
+    dark, pale = (drawn_crack(lambda x: 0 * x + 6.0, darkness=d, slope=0.0) for d in (0.7, 0.25))
+    rgb = dark.rgb.copy()
+    rgb[:, 200:300] = pale.rgb[:, 200:300]
+    mask = np.abs(np.mgrid[:160, :480][0] - np.interp(np.arange(480), dark.x, dark.y)) < 3
+    (crack,) = measure_cracks(ArrayRaster(rgb), mask, 30, 15).cracks
+    filled = np.abs(crack.centreline[:, 0] - 250) < 35
+    assert np.median(crack.widths.width_px[filled]) == pytest.approx(6.0, abs=0.3)
+
+
 def test_a_narrow_slit_with_nothing_to_anchor_it_gets_an_upper_bound() -> None:
     found = measured(drawn_crack(lambda x: 0 * x + 1.0)).cracks[0].widths
     assert found.is_upper_bound and 1.0 <= found.width_px.max() < 2.5
