@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Window(NamedTuple):
-    """Rows top to bottom, columns left to right, both ends excluded; in this order a Raster takes them."""
+    """Rows top to bottom and columns left to right, bottom and right excluded: as a Raster is asked."""
 
     top: int
     bottom: int
