@@ -123,7 +123,8 @@ def _unused(inspection: Inspection, structure: Structure | None) -> tuple[LeftOu
 def _flown(inspection: Inspection, planned: FlightPlan) -> FlightLog:
     """Each flight of the plan in turn. A vehicle flies one of them a run, since its battery is changed then;
     a rehearsal flies all."""
-    if inspection.flight == "vehicle" and inspection.connection is None:
+    connection = inspection.connection if inspection.flight == "vehicle" else None
+    if inspection.flight == "vehicle" and connection is None:
         raise BadInput("connection", "missing for 'flight: vehicle'", "Give it, as udpin:0.0.0.0:14550")
     legs = planned.each_flight
     flown = [fly.is_cached(leg, _mission(inspection, n), "", 30.0) for n, leg in enumerate(legs)]
@@ -132,13 +133,13 @@ def _flown(inspection: Inspection, planned: FlightPlan) -> FlightLog:
     seed = inspection.simulation.seed if inspection.simulation else 1
     logs = []
     for n, leg in enumerate(legs):
-        if inspection.flight == "vehicle" and inspection.connection is not None:
-            logs.append(fly(leg, _mission(inspection, n), inspection.connection, 30.0))
-            if not flown[n] and n + 1 < len(legs):
-                wait_for_battery(n + 1, len(legs))
-        else:
-            with start_vehicle(leg, seed + n) as connection:
-                logs.append(fly(leg, _mission(inspection, n), connection, 30.0))
+        if connection is None:
+            with start_vehicle(leg, seed + n) as simulated:
+                logs.append(fly(leg, _mission(inspection, n), simulated, 30.0))
+            continue
+        logs.append(fly(leg, _mission(inspection, n), connection, 30.0))
+        if not flown[n] and n + 1 < len(legs):
+            wait_for_battery(n + 1, len(legs))
     return joined(logs)
 
 

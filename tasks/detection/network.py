@@ -18,7 +18,7 @@ from numba import njit
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
 from tasks.detection.sauvola import Mask
-from tasks.detection.windows import Window, windows
+from tasks.detection.windows import Window, whole_of, windows
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
@@ -92,7 +92,7 @@ def probability(raster: Raster, model: Model, on_progress: Progress | None = Non
     """(H, W) of the whole image, window by window; 0 where nothing is known.
     BadInput for an unfit network."""
     net = _read(model)
-    image = Window(0, raster.height_px, 0, raster.width_px)
+    image = whole_of(raster)
     whole = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
     done_px = 0
     for window, wider in _windows(net, raster, image, OCTAVES if model.at_smaller_sizes else (), model):
@@ -113,9 +113,8 @@ def _windows(
     net: Any, raster: Raster, of: Window, octaves: tuple[int, ...], model: Model
 ) -> Iterator[tuple[Window, tuple[Answer, ...]]]:
     """The windows of `of`, each with what the network says of a wider one at each of the octaves."""
-    image = Window(0, raster.height_px, 0, raster.width_px)
     octave = octaves[0] if octaves else 0
-    for window in windows(of, image, HALO_PX << octave, SEEN_PX << 2 * octave, STEP_PX):
+    for window in windows(of, whole_of(raster), HALO_PX << octave, SEEN_PX << 2 * octave, STEP_PX):
         if not octaves:
             yield window, ()
         elif raster.valid(*window).any():
@@ -148,8 +147,7 @@ def _fill(whole: Probability, logit: Logits, valid: Mask) -> None:
 
 
 def _answer(net: Any, raster: Raster, window: Window, octave: int, model: Model) -> Answer:
-    image = Window(0, raster.height_px, 0, raster.width_px)
-    seen = window.grown(HALO_PX << octave, image)
+    seen = window.grown(HALO_PX << octave, whole_of(raster))
     return Answer(_logits(net, _reduced(raster, seen, octave), model), seen.top, seen.left, octave)
 
 

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from itertools import product
 from typing import NamedTuple
 
+from schemas.raster import Raster
+
 
 class Window(NamedTuple):
     """Rows top to bottom and columns left to right, bottom and right excluded: as a Raster is asked."""
@@ -24,6 +26,10 @@ class Window(NamedTuple):
     @property
     def area_px(self) -> int:
         return (self.bottom - self.top) * (self.right - self.left)
+
+
+def whole_of(raster: Raster) -> Window:
+    return Window(0, raster.height_px, 0, raster.width_px)
 
 
 def windows(of: Window, image: Window, halo_px: int, most_px: int, step_px: int) -> Iterator[Window]:

@@ -12,7 +12,7 @@ from tasks.registration.rigid_motion import Array
 
 LOOK_DEG = 1.5  # cells of a view
 ONE_RANGE = (
-    0.75  # of all points, in cells of one range; from a scanner's place ≥ 0.82, elsewhere in it ≤ 0.64
+    0.75  # of all points, in cells of one range: ≥ 0.82 from a scanner's place, ≤ 0.64 elsewhere in it
 )
 AS_GOOD = 0.10  # less of them than from the likely place: it stood there rather
 FARTHEST_OFF = 2.0  # times the cloud's extent; from far away all that there is lies in one direction

@@ -25,9 +25,8 @@ from tasks.registration.station_cloud import (
     turned,
 )
 
-MOST_AWAY = (
-    0.1  # of normals that a program turned to (0, 0, 0); where no scanner stood there, they tell no side
-)
+# Of normals that a program turned to (0, 0, 0); where no scanner stood there, they tell no side.
+MOST_AWAY = 0.1
 LEAST_POINTS = 100  # fewer, at equal density, are no scan of a structure
 FEATURE_RADII = 5  # coarse voxels
 OVERLAP_POINTS = 20_000  # tell a share of them to half a percent

@@ -19,8 +19,9 @@ Array = npt.NDArray[np.float64]
 STEP_M = 0.001
 SMOOTH_M = 0.005
 # RMS of the heading in degrees at each correlation length: crack paths are self-affine, they go around grains
-# of every size. Along the centrelines of 352 photos (uav, DeepCrack) each chord turns from the last by 16 to
-# 19° RMS, be they 8, 16, 32 or 64 px long; ours of 8 to 64 mm by 15 to 20.
+# of every size. Along the centrelines of 352 photos (uav, DeepCrack) each chord turns from the last by 19 to
+# 26° RMS, be they 8, 16, 32 or 64 px long, through junctions too; ours, without any, by 13 to 18°
+# (`make bench-detection`, part turns).
 WANDER_DEG = {0.04: 12.0, 0.02: 9.0, 0.01: 10.5, 0.005: 13.0}
 WIDTH_SIGMA = 0.15  # RMS of ln(width) along the crack
 WIDTH_LENGTH_M = 0.06

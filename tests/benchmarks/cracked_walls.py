@@ -34,6 +34,7 @@ class Wall:
     truth: Mask  # where the crack is
     wide: Mask  # where it is at least `least_px` wide: this much must be found
     shadow_edge: Mask  # within 4 px of the edge of the shadow
+    crack: CrackShape
 
 
 def cracked_wall(
@@ -77,7 +78,7 @@ def cracked_wall(
     u, v = (np.arange(SIDE_PX) + 0.5) * PX_M, (SIDE_PX - 0.5 - np.arange(SIDE_PX)) * PX_M
     off = (u[None] - side_m / 2) * np.cos(tilt) + (v[:, None] - side_m / 2) * np.sin(tilt)
     truth, wide = (_where(shape, width) for width in (0.0, least_px))
-    return Wall(rgb, truth, wide, np.abs(off) < 4 * PX_M)
+    return Wall(rgb, truth, wide, np.abs(off) < 4 * PX_M, shape)
 
 
 def _where(shape: CrackShape, least_px: float) -> Mask:

@@ -25,7 +25,7 @@ from tasks.detection.components import components
 from tasks.detection.detect import detect_image
 from tasks.detection.network import OUR_LIMITS, Model, our_model
 from tasks.detection.sauvola import grey_of, sauvola
-from tests.benchmarks import wall_rows
+from tests.benchmarks import crack_rows, wall_rows
 from tests.benchmarks.table import Row, absent, gather, row
 from tests.development_data import ROOT
 from training.photos import FOLDS, by_fold
@@ -257,6 +257,8 @@ PARTS = {
     "false-on-photos": false_on_photos,
     "speed": speed,
     "walls": wall_rows.rows,
+    "turns": crack_rows.turns,
+    "widths": crack_rows.widths,
 }
 
 if __name__ == "__main__":
