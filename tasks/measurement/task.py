@@ -26,7 +26,8 @@ GAP_LENGTHS = 0.4  # a gap within a crack is bridged up to this share of the lea
 def pages(inputs: Mapping[str, Any], measurement: Measurement) -> list[Page]:
     mosaic: Mosaic = inputs["mosaic"]
     picture = lines_markdown(mosaic, (crack.polyline_px for crack in measurement.cracks), (255, 0, 0))
-    found = f"### {len(measurement.cracks)} cracks on {mosaic.name}"
+    many = len(measurement.cracks)
+    found = f"### {many} crack{'' if many == 1 else 's'} on {mosaic.name}"
     blur = f"Blur σ {measurement.psf_px:.2f} px; {len(measurement.rejected)} candidates rejected."
     shown = [Page(key=page_key("cracks", mosaic.name), markdown="\n\n".join([found, blur, picture]))]
     if measurement.cracks:
