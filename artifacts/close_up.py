@@ -8,9 +8,10 @@ from markupsafe import Markup
 
 from artifacts import palette, svg
 from artifacts.data_uri import jpeg_uri, mask_uri
-from artifacts.mosaic_view import MosaicView, Pixels, Window, reduced_mask
+from artifacts.mosaic_view import MosaicView, Window, reduced_mask
 from artifacts.surface_sheet import simplified
 from artifacts.view3d import nice_length
+from schemas.bit_mask import BitMask
 from schemas.crack import Crack
 
 SIDE, GAP = 340.0, 14.0  # CSS px of a panel
@@ -47,7 +48,7 @@ def widest_place(crack: Crack) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.
 
 
 def close_up(
-    view: MosaicView, mask: Pixels, crack: Crack, number: int, side_mm: float, max_bytes: int
+    view: MosaicView, mask: BitMask, crack: Crack, number: int, side_mm: float, max_bytes: int
 ) -> Markup:
     """An SVG of two panels with a scale bar. mask: of the whole mosaic; number: unique in the page;
     side_mm: of the window; max_bytes: of its picture."""
@@ -78,14 +79,14 @@ def close_up(
 
 
 def _overlay(
-    root: ElementTree.Element, window: Window, mask: Pixels, crack: Crack, x: float, scale: float
+    root: ElementTree.Element, window: Window, mask: BitMask, crack: Crack, x: float, scale: float
 ) -> None:
     """What was detected, tinted; the centreline; and bars across the widest place."""
     colour = palette.SEVERITY[crack.severity]
     width, height = window.width_px * scale, window.height_px * scale
-    part = mask[window.y0 : window.y1, window.x0 : window.x1]
+    part = reduced_mask(mask, window, window.reduced_size(MOST_PX))
     if part.any():
-        tint = mask_uri(reduced_mask(part, window.reduced_size(MOST_PX)), palette.rgb(colour), 0.55)
+        tint = mask_uri(part, palette.rgb(colour), 0.55)
         place = {"x": x, "y": 0.0, "width": width, "height": height, "preserveAspectRatio": "none"}
         svg.add(root, "image", href=tint, **place)
     inner = svg.add(root, "svg", x=x, y=0, width=width, height=height)

@@ -4,17 +4,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from markupsafe import Markup
 
 from artifacts import atlas, precision
 from artifacts.close_up import close_up
 from artifacts.data_uri import jpeg_uri
+from artifacts.mask_png import read_mask
 from artifacts.mosaic_view import MosaicView, OpenFile, reduced_mask
 from artifacts.photo_pages import PhotoPages, photo_pages
-from artifacts.raster import read_mask
 from artifacts.surface_sheet import sheet
 from artifacts.width_graph import width_graph
+from schemas.bit_mask import BitMask
 from schemas.crack import Crack, Measurement
 from schemas.detection import Detection, Patterns
 from schemas.inspection import Inspection
@@ -139,22 +139,22 @@ def matched(
     ]
 
 
-def _mask(one: Seen, open_file: OpenFile) -> npt.NDArray[np.uint8]:
-    """(H, W), 0/255; all 0 where detection left none."""
+def _mask(one: Seen, open_file: OpenFile) -> BitMask:
+    """Set nowhere where detection left none."""
     if one.detection is None or not one.cracks:
-        return np.zeros((one.mosaic.height_px, one.mosaic.width_px), dtype=np.uint8)
+        return BitMask(one.mosaic.height_px, one.mosaic.width_px)
     return read_mask(open_file(one.detection.mask), one.mosaic.name)
 
 
 def _panels(
-    one: Seen, view: MosaicView, mask: npt.NDArray[np.uint8], open_file: OpenFile, max_bytes: int
+    one: Seen, view: MosaicView, mask: BitMask, open_file: OpenFile, max_bytes: int
 ) -> Iterator[Panel]:
     """As in the paper's figures: stitched, patterns taken out, global thresholds, local threshold."""
     size = view.whole.reduced_size(*PANEL_PX)
     yield Panel("Stitched image", jpeg_uri(view.picture(view.whole, size), max_bytes))
 
-    def panel(title: str, pixels: npt.NDArray[np.uint8]) -> Panel:
-        inverted = np.where(reduced_mask(pixels, size), 20, 250).astype(np.uint8)
+    def panel(title: str, shown: BitMask) -> Panel:
+        inverted = np.where(reduced_mask(shown, view.whole, size), 20, 250).astype(np.uint8)
         return Panel(title, jpeg_uri(inverted, max_bytes))
 
     if one.patterns is not None:

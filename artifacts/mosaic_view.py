@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from artifacts.raster import TiffWindows
+from schemas.bit_mask import BitMask
 from schemas.file import File
 from schemas.mosaic import Mosaic
 
@@ -96,13 +98,14 @@ def _reduced(source: TiffWindows, window: Window, size: tuple[int, int]) -> npt.
     return np.asarray(cv2.resize(np.concatenate(parts), size, interpolation=cv2.INTER_AREA))
 
 
-def reduced_mask(mask: Pixels, size: tuple[int, int]) -> npt.NDArray[np.bool_]:
-    """(height, width): set where any pixel under it is, so that the thinnest crack stays in sight."""
-    width, height = (min(size[0], mask.shape[1]), min(size[1], mask.shape[0]))
-    rows = np.arange(height) * mask.shape[0] // height
-    columns = np.arange(width) * mask.shape[1] // width
-    any_in_rows = np.maximum.reduceat(mask, rows, axis=0)
-    return np.asarray(np.maximum.reduceat(any_in_rows, columns, axis=1) > 0)
+def reduced_mask(mask: BitMask, window: Window, size: tuple[int, int]) -> npt.NDArray[np.bool_]:
+    """(height, width) of a window: set where any pixel under it is, so that the thinnest crack stays in
+    sight."""
+    width, height = (min(size[0], window.width_px), min(size[1], window.height_px))
+    rows = window.y0 + np.arange(height + 1) * window.height_px // height
+    columns = np.arange(width) * window.width_px // width
+    any_in_rows = (mask.read(a, b, window.x0, window.x1).any(axis=0) for a, b in pairwise(rows.tolist()))
+    return np.stack([np.logical_or.reduceat(row, columns) for row in any_in_rows])
 
 
 def _hatch(size: tuple[int, int]) -> Pixels:

@@ -1,7 +1,7 @@
 """Thumbnails for the dashboard: a mosaic with a mask or lines drawn on it, as a data URI."""
 
 import base64
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from pathlib import Path
 
@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from artifacts import store
-from artifacts.raster import TiffWindows, read_mask
+from artifacts.mask_png import read_mask
+from artifacts.raster import TiffWindows
 from schemas.contract import Vector2
 from schemas.file import File
 from schemas.mosaic import Mosaic
@@ -23,24 +24,32 @@ BAND_PX = 1024
 def thumbnail(mosaic: Mosaic) -> tuple[Pixels, float]:
     """(h, w, 3) RGB of the whole mosaic, and its scale against it."""
     scale = min(1.0, WIDEST_PX / max(mosaic.width_px, mosaic.height_px))
-    size = (max(1, round(mosaic.width_px * scale)), max(1, round(mosaic.height_px * scale)))
-    small = np.zeros((size[1], size[0], 3), dtype=np.uint8)
     with closing(TiffWindows(store.current().path(mosaic.image), mosaic.name)) as windows:
-        for y0 in range(0, mosaic.height_px, BAND_PX):
-            y1 = min(mosaic.height_px, y0 + BAND_PX)
-            top, bottom = round(y0 * scale), round(y1 * scale)
-            if bottom > top:
-                band = windows.read(y0, y1, 0, mosaic.width_px)
-                small[top:bottom] = cv2.resize(band, (size[0], bottom - top), interpolation=cv2.INTER_AREA)
+        small = _reduced(mosaic, scale, lambda y0, y1: windows.read(y0, y1, 0, mosaic.width_px))
     return small, scale
+
+
+def _reduced(mosaic: Mosaic, scale: float, rows: Callable[[int, int], Pixels]) -> Pixels:
+    """(h, w[, 3]) of what `rows` reads of a mosaic's size, band by band."""
+    size = (max(1, round(mosaic.width_px * scale)), max(1, round(mosaic.height_px * scale)))
+    bands = []
+    for y0 in range(0, mosaic.height_px, BAND_PX):
+        y1 = min(mosaic.height_px, y0 + BAND_PX)
+        height = round(y1 * size[1] / mosaic.height_px) - round(y0 * size[1] / mosaic.height_px)
+        if height:
+            bands.append(cv2.resize(rows(y0, y1), (size[0], height), interpolation=cv2.INTER_AREA))
+    return np.asarray(np.concatenate(bands), dtype=np.uint8)
 
 
 def mask_markdown(mosaic: Mosaic, mask: File, colour: tuple[int, int, int]) -> str:
     """The mosaic with the pixels of a mask tinted; what is thin stays visible."""
-    picture, _ = thumbnail(mosaic)
-    pixels = read_mask(store.current().path(mask), mosaic.name)
-    size = (picture.shape[1], picture.shape[0])
-    share = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None] / 255
+    picture, scale = thumbnail(mosaic)
+    bits = read_mask(store.current().path(mask), mosaic.name)
+
+    def white(y0: int, y1: int) -> Pixels:
+        return np.where(bits.read(y0, y1, 0, bits.width_px), np.uint8(255), np.uint8(0))
+
+    share = _reduced(mosaic, scale, white).astype(np.float32)[..., None] / 255
     tint = np.clip(4 * share, 0, 1) * 0.7
     tinted = picture * (1 - tint) + np.array(colour, dtype=np.float32) * tint
     return markdown_of(tinted.astype(np.uint8), mosaic.name)

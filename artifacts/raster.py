@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import tifffile
 
+from artifacts.mask_png import read_mask
 from schemas.problem import BadInput
 from schemas.raster import Pixels
 
@@ -67,7 +68,7 @@ class TiffWindows:
 class MosaicRaster:
     """A mosaic's pixels, and where it knows them: covered by a photo and not taken out by a mask.
 
-    mask: a PNG, non-zero where pixels are to be taken out (Patterns.mask); None takes none out."""
+    mask: set where pixels are to be taken out (Patterns.mask); None takes none out."""
 
     def __init__(self, image: Path, coverage: Path, name: str, mask: Path | None = None) -> None:
         with ExitStack() as opened:
@@ -76,7 +77,7 @@ class MosaicRaster:
             self.height_px, self.width_px = self._image.height_px, self._image.width_px
             self._mask = None if mask is None else read_mask(mask, name)
             sizes = [(self._coverage.height_px, self._coverage.width_px)]
-            sizes += [] if self._mask is None else [self._mask.shape[:2]]
+            sizes += [] if self._mask is None else [(self._mask.height_px, self._mask.width_px)]
             if any(size != (self.height_px, self.width_px) for size in sizes):
                 raise BadInput(name, "its mosaic and its masks differ in size", REMEDY)
             self._opened = opened.pop_all()  # nothing went wrong: they stay open until close()
@@ -87,7 +88,7 @@ class MosaicRaster:
     def valid(self, y0: int, y1: int, x0: int, x1: int) -> npt.NDArray[np.bool_]:
         known = self._coverage.read(y0, y1, x0, x1) > 0
         if self._mask is not None:
-            known &= self._mask[y0:y1, x0:x1] == 0
+            known &= ~self._mask.read(y0, y1, x0, x1)
         return known
 
     def close(self) -> None:
@@ -100,14 +101,6 @@ class MosaicRaster:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def read_mask(path: Path, name: str) -> Pixels:
-    """(H, W) uint8 of a one-channel PNG."""
-    mask = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-    if mask is None:
-        raise BadInput(name, "its mask cannot be read", REMEDY)
-    return np.asarray(mask, dtype=np.uint8)
 
 
 def read_drawn_mask(path: Path, name: str) -> npt.NDArray[np.bool_]:
@@ -123,9 +116,3 @@ def read_drawn_mask(path: Path, name: str) -> npt.NDArray[np.bool_]:
         share = f"marks {100 * mask.mean():.0f} % of the image as crack"
         raise BadInput(name, share, "Where it is black on white, invert it: cracks are what is not 0")
     return mask
-
-
-def write_mask(mask: npt.NDArray[np.bool_] | Pixels, path: Path) -> None:
-    """A PNG, 255 where `mask` is set, else 0."""
-    if not cv2.imwrite(str(path), np.where(mask, np.uint8(255), np.uint8(0))):
-        raise OSError(f"{path} could not be written")

@@ -111,7 +111,7 @@ def compare(
     paths = photos_in(images)
     for number, path in enumerate(paths, start=1):
         try:
-            truth = read_mask(drawn, path)
+            truth = drawn_for(drawn, path)
             mosaic, patterns = prepared(path, gsd_mm_px, truth.shape)
             of_methods = {name: mask_of(mosaic, patterns, settings) for name, settings in methods.items()}
             if "hairline" in methods:
@@ -153,13 +153,14 @@ def prepared(path: Path, gsd_mm_px: float | None, shape: tuple[int, ...]) -> tup
 
 def mask_of(mosaic: Mosaic, patterns: Patterns, settings: DetectSettings) -> Mask:
     from artifacts import store
+    from artifacts.mask_png import read_mask
     from tasks.detection.task import detect
 
     path = store.current().path(detect.bare(mosaic, patterns, settings).mask)
-    return np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)) > 0
+    return read_mask(path, mosaic.name).whole()
 
 
-def read_mask(drawn: dict[str, Path], image: Path) -> Mask:
+def drawn_for(drawn: dict[str, Path], image: Path) -> Mask:
     if image.stem not in drawn:
         raise BadInput(image.name, "has no mask of the same name", "Add it to the folder of masks")
     from artifacts.raster import read_drawn_mask

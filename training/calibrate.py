@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.raster import ArrayRaster
+from tasks.connected import Marked
 from tasks.detection.candidates import STRONGEST, features
 from tasks.detection.components import components
 from tasks.detection.network import OUR_LIMITS, Model, Probability, probability
@@ -80,13 +81,14 @@ def fit_pixels(pairs: list[tuple[Probability, Mask]]) -> Floats:
 
 def judged(p: Probability, truth: Mask, least_px: float) -> tuple[Floats, Mask]:
     """Features of the long and thin candidates, and which of them are cracks."""
-    found = components(p >= OUR_LIMITS.edge)
-    which = found.holding(p >= OUR_LIMITS.sure) & (found.extent_px >= least_px) & found.thin
+    found = components(Marked.of_levels(np.where(p >= OUR_LIMITS.edge, p, np.uint8(0))))
+    which = found.holding(found.pixels.level >= OUR_LIMITS.sure) & (found.extent_px >= least_px) & found.thin
     which[0] = False
     reach = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEAR_PX + 1, 2 * NEAR_PX + 1))
     near = cv2.dilate(truth.astype(np.uint8), reach) > 0
-    right = np.bincount(found.labels[near], minlength=len(which)) / np.maximum(found.area_px, 1.0)
-    return features(found, p)[which], right[which] >= 0.5
+    on_crack = np.bincount(found.label[near[found.pixels.y, found.pixels.x]], minlength=len(which))
+    right = on_crack / np.maximum(found.area_px, 1.0)
+    return features(found)[which], right[which] >= 0.5
 
 
 def main(model_path: Path, photos: Path, fold: int, folders: list[Path]) -> None:

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from tasks.connected import Marked
 from tasks.detection.components import Components, components
-from tasks.detection.network import Limits, Probability
+from tasks.detection.network import Limits
 
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
 WEIGHTS = (1.843, -1.515, -0.454, -1.599)  # of the features, from training.calibrate
@@ -38,21 +39,22 @@ class Candidates(NamedTuple):
         return tuple(scored)
 
 
-def candidates(probability: Probability, limits: Limits) -> Candidates:
-    """Connected pixels of at least `edge` that hold one of at least `sure`, each with its score."""
-    found = components(probability >= limits.edge)
-    sure = found.holding(probability >= limits.sure)
-    score = np.where(sure, score_of(features(found, probability)), 0.0)
+def candidates(pixels: Marked, limits: Limits) -> Candidates:
+    """Connected pixels that hold one of at least `sure`, each with its score. pixels: those of at least
+    `edge`; their level is 255 × the probability."""
+    found = components(pixels)
+    sure = found.holding(pixels.level >= limits.sure)
+    score = np.where(sure, score_of(features(found)), 0.0)
     score[0] = 0.0
     return Candidates(found, score)
 
 
-def features(found: Components, probability: Probability) -> Floats:
+def features(found: Components) -> Floats:
     """(n, 4) by label: logit of the strength, the bend and its square, 1.
 
     The bend is ln(short / long) of the axes of inertia: a ruled line of 300 px has −5, a crack −3 to −1, a
     ring 0. Both ends are rarely cracks, hence the square."""
-    p = np.clip(strength(found, probability), 1.0 - STRONGEST, STRONGEST)
+    p = np.clip(strength(found), 1.0 - STRONGEST, STRONGEST)
     bend = _bend(found)
     return np.column_stack([np.log(p / (1.0 - p)), bend, bend**2, np.ones(len(p))])
 
@@ -62,12 +64,10 @@ def score_of(of_candidates: Floats) -> Floats:
     return np.asarray(1.0 / (1.0 + np.exp(-(of_candidates @ np.asarray(WEIGHTS)))))
 
 
-def strength(found: Components, probability: Probability) -> Floats:
+def strength(found: Components) -> Floats:
     """Mean probability of each component's surer half, that is along its middle: its rim is never sure."""
-    inside = found.labels > 0
-    labels, values = found.labels[inside], probability[inside].astype(np.int64)
-    order = np.lexsort((-values, labels))
-    labels, values = labels[order], values[order]
+    order = np.lexsort((255 - found.pixels.level, found.label))
+    labels, values = found.label[order], found.pixels.level[order]
     pixels = np.bincount(labels, minlength=len(found.area_px))
     rank = np.arange(len(labels)) - (np.cumsum(pixels) - pixels)[labels]
     core = rank < (pixels[labels] + 1) // 2
@@ -77,15 +77,12 @@ def strength(found: Components, probability: Probability) -> Floats:
 
 def _bend(found: Components) -> Floats:
     """ln of the ratio of the axes of inertia of each component, at most 0."""
-    y, x = np.nonzero(found.labels)
-    label = found.labels[y, x]
-    count = np.maximum(np.bincount(label, minlength=len(found.area_px)), 1)
+    label, count = found.label, np.maximum(found.area_px, 1.0)
 
     def mean(values: Floats) -> Floats:
         return np.asarray(np.bincount(label, values, minlength=len(count)) / count)
 
-    dx = x - mean(x.astype(np.float64))[label]
-    dy = y - mean(y.astype(np.float64))[label]
+    dx, dy = (at - mean(at.astype(np.float64))[label] for at in (found.pixels.x, found.pixels.y))
     xx, yy, xy = mean(dx * dx), mean(dy * dy), mean(dx * dy)
     middle, spread = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     pixel = 1 / 12  # a single pixel's own inertia

@@ -2,22 +2,22 @@
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tasks.detection.sauvola import Mask
+from tasks.connected import Indices, Marked, connected
 
 ELONGATION = 5.0  # least extent over mean width of a crack, and of a crack's network
 THROUGH = 2.7  # of one that runs through the image; a disc has 2.5
 
 
 class Components(NamedTuple):
-    """8-connected components. Label 0 is the background; arrays are indexed by label."""
+    """8-connected components of some pixels. Arrays are indexed by label; label 0 is none of them."""
 
-    labels: npt.NDArray[np.int32]  # (H, W)
+    pixels: Marked
+    label: Indices  # (n,) of each pixel, 1 and up
     area_px: npt.NDArray[np.float64]
-    boxes: npt.NDArray[np.int32]  # (n, 4) x, y, width, height
+    boxes: npt.NDArray[np.int32]  # (labels, 4) x, y, width, height
 
     @property
     def extent_px(self) -> npt.NDArray[np.float64]:
@@ -34,7 +34,7 @@ class Components(NamedTuple):
         """Which are as thin as cracks. Of what runs through the image from side to side, seen from near,
         nobody sees how long it is: there less is enough."""
         x, y, width, height = self.boxes.T
-        high, wide = self.labels.shape
+        high, wide = self.pixels.height_px, self.pixels.width_px
         through = ((x == 0) & (width == wide)) | ((y == 0) & (height == high))
         return np.asarray(self.elongation >= np.where(through, THROUGH, ELONGATION))
 
@@ -42,25 +42,30 @@ class Components(NamedTuple):
         x, y, width, height = (int(n) for n in self.boxes[label])
         return x, y, width, height
 
-    def holding(self, mask: Mask) -> npt.NDArray[np.bool_]:
-        """Which components have a pixel in `mask`."""
-        return np.bincount(self.labels[mask], minlength=len(self.area_px)) > 0
+    def holding(self, chosen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Which components have one of the pixels that (n,) chooses."""
+        return np.bincount(self.label[chosen], minlength=len(self.area_px)) > 0
 
-    def keep(self, which: npt.NDArray[np.bool_]) -> Mask:
-        """(H, W) mask of the components chosen, the background never."""
-        chosen = which.copy()
-        chosen[0] = False
-        return np.asarray(chosen[self.labels])
+    def keep(self, which: npt.NDArray[np.bool_]) -> Marked:
+        """The pixels of the components chosen."""
+        return self.pixels.where(which[self.label])
 
 
-def components(mask: Mask) -> Components:
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    area = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
-    return Components(np.asarray(labels, dtype=np.int32), area, np.asarray(stats[:, :4], dtype=np.int32))
+def components(pixels: Marked) -> Components:
+    label, count = connected(pixels)
+    area = np.bincount(label, minlength=count + 1).astype(np.float64)
+    low = np.full((count + 1, 2), np.iinfo(np.int32).max, dtype=np.int32)
+    high = np.full((count + 1, 2), -1, dtype=np.int32)
+    for n, at in enumerate((pixels.x, pixels.y)):
+        np.minimum.at(low[:, n], label, at)
+        np.maximum.at(high[:, n], label, at)
+    boxes = np.hstack([low, high - low + 1])
+    boxes[0] = 0
+    return Components(pixels, label, area, boxes)
 
 
-def long_and_thin(levels: npt.NDArray[np.uint8], seed_level: int, min_length_px: float) -> Mask:
-    """Components of non-zero `levels` that are long, thin and hold a pixel of at least `seed_level`."""
-    found = components(levels > 0)
+def long_and_thin(pixels: Marked, seed_level: int, min_length_px: float) -> Marked:
+    """Components that are long, thin and hold a pixel of at least `seed_level`."""
+    found = components(pixels)
     which = (found.extent_px >= min_length_px) & found.thin
-    return found.keep(which & found.holding(levels >= seed_level))
+    return found.keep(which & found.holding(pixels.level >= seed_level))

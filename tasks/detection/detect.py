@@ -5,16 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from schemas.bit_mask import BitMask
 from schemas.detection import Peaks
 from schemas.raster import ArrayRaster, Pixels, Progress, Raster
 from schemas.settings import DetectSettings
+from tasks.connected import Marked, Part, above_0
 from tasks.detection.bands import by_bands
 from tasks.detection.candidates import Scored, candidates
 from tasks.detection.components import long_and_thin
 from tasks.detection.edges import without_soft
 from tasks.detection.global_threshold import PAPER, Histogram, darker_than, from_peaks, otsu
 from tasks.detection.joints import Joint, without_joints
-from tasks.detection.network import Model, our_model, probability
+from tasks.detection.network import Model, our_model, probabilities
 from tasks.detection.paper import paper_mask
 from tasks.detection.ridge import SEED, Scale, dark_levels
 from tasks.detection.sauvola import Mask, grey_of
@@ -26,12 +28,17 @@ JOINT_LENGTHS = 8.0  # what is straight over this many times the least length of
 
 @dataclass(frozen=True)
 class DetectionArrays:
-    mask: Mask  # (H, W), True on cracks
+    bits: BitMask  # True on cracks
     inspected_px: int
     joints: tuple[Joint, ...] = ()  # straight lines that are dark but no cracks
     stains: tuple[tuple[float, float], ...] = ()  # where something dark has soft edges, x, y
     scores: tuple[Scored, ...] = ()  # of the cracks, by a network
     doubtful: tuple[Scored, ...] = ()  # long enough, but with a score below the settings' least
+
+    @property
+    def mask(self) -> Mask:
+        """(H, W), of an image that fits in memory."""
+        return self.bits.whole()
 
 
 def detect_image(
@@ -75,16 +82,21 @@ def _by_network(
     raster: Raster, model: Model, min_score: float, least_px: float, on_progress: Progress | None
 ) -> DetectionArrays:
     """What a network holds for cracks, long and likely enough as a whole, less what is straight."""
-    given = candidates(probability(raster, model, on_progress), model.limits)
+    parts = (
+        above_0(np.where(p >= model.limits.edge, p, np.uint8(0)), window.top, window.left)
+        for window, p in probabilities(raster, model, on_progress)
+    )
+    pixels = Marked.gathered(raster.height_px, raster.width_px, parts)
+    given = candidates(pixels, model.limits)
     long = (given.found.extent_px >= least_px) & given.found.thin
     likely = given.score >= min_score
-    mask, joints = without_joints(given.found.keep(long & likely), JOINT_LENGTHS * least_px, least_px)
-    mask = long_and_thin(mask.astype(np.uint8), 1, least_px)
+    left, joints = without_joints(given.found.keep(long & likely), JOINT_LENGTHS * least_px, least_px)
+    mask = long_and_thin(left, 1, least_px).mask
     return DetectionArrays(
         mask,
         count_valid(raster),
         tuple(joints),
-        scores=given.at(given.found.holding(mask)),
+        scores=given.at(given.found.holding(mask.at(pixels.y, pixels.x))),
         doubtful=given.at(long & ~likely & (given.score >= WORTH_SAYING)),
     )
 
@@ -96,26 +108,21 @@ def _ridge(
     least_px: float,
     on_progress: Progress | None,
 ) -> DetectionArrays:
-    levels = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
-    lit = np.zeros_like(levels)  # grey, 0 where nothing is known: no lit surface is black
-
-    def band(y0: int, y1: int, top: int, bottom: int) -> int:
+    def band(y0: int, y1: int, top: int, bottom: int) -> Part:
         grey = grey_of(raster.rgb(top, bottom, 0, raster.width_px))
         valid = raster.valid(top, bottom, 0, raster.width_px)
-        inner = slice(y0 - top, y1 - top)
-        levels[y0:y1] = dark_levels(grey, valid, scale, settings.k, settings.R)[inner]
-        lit[y0:y1] = np.where(valid, grey, 0)[inner]
-        return int(valid[inner].sum())
+        levels = dark_levels(grey, valid, scale, settings.k, settings.R)
+        return above_0(levels[y0 - top : y1 - top], y0, 0)
 
-    inspected = sum(by_bands(raster.height_px, scale.halo, band, on_progress))
-    mask = long_and_thin(levels, SEED, least_px)
-    mask, stains = without_soft(mask, lit, (levels == 0) & (lit > 0))
-    mask, joints = without_joints(mask, JOINT_LENGTHS * least_px, least_px)
-    mask = long_and_thin(np.where(mask, levels, np.uint8(0)), SEED, least_px)
-    return DetectionArrays(mask, inspected, tuple(joints), tuple(stains))
+    parts = by_bands(raster.height_px, scale.halo, band, on_progress)
+    dark = Marked.gathered(raster.height_px, raster.width_px, parts)
+    kept, stains = without_soft(long_and_thin(dark, SEED, least_px), raster, dark.mask)
+    kept, joints = without_joints(kept, JOINT_LENGTHS * least_px, least_px)
+    mask = long_and_thin(kept, SEED, least_px).mask
+    return DetectionArrays(mask, count_valid(raster), tuple(joints), tuple(stains))
 
 
-def baselines(raster: Raster, peaks: Peaks) -> list[tuple[str, Mask]]:
+def baselines(raster: Raster, peaks: Peaks) -> list[tuple[str, BitMask]]:
     """The global thresholds for the report, by name."""
     histogram = red_histogram(raster)
     thresholds = [(f"T = {t}", float(t)) for t in PAPER]
@@ -123,13 +130,13 @@ def baselines(raster: Raster, peaks: Peaks) -> list[tuple[str, Mask]]:
     return [(name, global_mask(raster, t)) for name, t in thresholds]
 
 
-def global_mask(raster: Raster, threshold: float) -> Mask:
+def global_mask(raster: Raster, threshold: float) -> BitMask:
     """Valid pixels whose grey level lies below one threshold for the whole image."""
-    mask = np.zeros((raster.height_px, raster.width_px), dtype=bool)
+    mask = BitMask(raster.height_px, raster.width_px)
 
     def band(y0: int, y1: int, _top: int, _bottom: int) -> None:
         grey = grey_of(raster.rgb(y0, y1, 0, raster.width_px))
-        mask[y0:y1] = darker_than(grey, raster.valid(y0, y1, 0, raster.width_px), threshold)
+        mask.write(y0, darker_than(grey, raster.valid(y0, y1, 0, raster.width_px), threshold))
 
     by_bands(raster.height_px, 0, band)
     return mask

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from tasks.connected import Marked
 from tasks.detection.components import components
-from tasks.detection.sauvola import Mask
 
 STRAIGHT_PX = 1.0  # largest RMS offset of a joint's centreline from a line: mosaics bend less than that
 VOTE_PX = 4.0  # width of a cell of the Hough vote
@@ -38,35 +38,32 @@ class Joint(NamedTuple):
     length_px: float
 
 
-def without_joints(mask: Mask, joint_px: float, piece_px: float) -> tuple[Mask, list[Joint]]:
-    """`mask` less the straight lines of at least `joint_px`; pieces of them of at least `piece_px`."""
-    found = components(mask)
-    y, x = np.nonzero(mask)
-    order = np.argsort(found.labels[y, x], kind="stable")
-    y, x = y[order], x[order]
-    ends = np.cumsum(np.bincount(found.labels[y, x], minlength=len(found.area_px)))
+def without_joints(pixels: Marked, joint_px: float, piece_px: float) -> tuple[Marked, list[Joint]]:
+    """`pixels` less the straight lines of at least `joint_px`; pieces of them of at least `piece_px`."""
+    found = components(pixels)
+    order = np.argsort(found.label, kind="stable")
+    ends = np.cumsum(found.area_px).astype(np.intp)
     runs: list[tuple[Run, npt.NDArray[np.intp]]] = []
-    for label in np.flatnonzero(found.extent_px >= piece_px):
-        if label == 0:
-            continue
-        index = np.arange(ends[label - 1], ends[label])
+    for label in np.flatnonzero(found.extent_px[1:] >= piece_px) + 1:
+        index = order[ends[label - 1] : ends[label]]
         while len(index) >= piece_px:
-            run = straight_run(np.column_stack([x[index], y[index]]).astype(np.float64), piece_px)
+            at = np.column_stack([pixels.x[index], pixels.y[index]]).astype(np.float64)
+            run = straight_run(at, piece_px)
             if run is None:
                 break
             runs.append((run, index[run.inside]))
             index = index[~run.inside]
-    joints, cleaned = [], mask.copy()
+    joints, left = [], np.ones(len(pixels.y), dtype=bool)
     for group in _on_one_line([run for run, _ in runs]):
         length = sum(runs[i][0].length_px for i in group)
         if length < joint_px:
             continue
         for i in group:
-            cleaned[y[runs[i][1]], x[runs[i][1]]] = False
+            left[runs[i][1]] = False
         longest = max((runs[i][0] for i in group), key=lambda run: run.length_px)
         middle = (longest.start + longest.end) / 2
         joints.append(Joint((float(middle[0]), float(middle[1])), length))
-    return cleaned, joints
+    return pixels.where(left), joints
 
 
 def straight_run(points: Points, least_px: float) -> Run | None:

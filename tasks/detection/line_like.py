@@ -7,8 +7,8 @@ background in the shade, and stay.
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from tasks.connected import Marked
 from tasks.detection.components import components
 from tasks.detection.sauvola import Mask
 
@@ -17,6 +17,6 @@ LINE_ELONGATION = 3.0  # extent over mean width: a disc has 2.5
 
 def compact_objects(dark: Mask, window_px: int) -> Mask:
     """(H, W): the dark pixels that belong to compact objects smaller than the window."""
-    found = components(dark)
-    compact: npt.NDArray[np.bool_] = found.elongation < LINE_ELONGATION
-    return found.keep(compact & (found.extent_px < window_px))
+    found = components(Marked.of_levels(dark.view(np.uint8)))
+    compact = found.elongation < LINE_ELONGATION
+    return np.asarray(found.keep(compact & (found.extent_px < window_px)).mask.whole())

@@ -89,11 +89,19 @@ class Answer(NamedTuple):
 
 
 def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:
-    """(H, W) of the whole image, window by window; 0 where nothing is known.
-    BadInput for an unfit network."""
+    """(H, W) of an image that fits in memory; 0 where nothing is known. BadInput for an unfit network."""
+    whole = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
+    for window, part in probabilities(raster, model, on_progress):
+        whole[window.top : window.bottom, window.left : window.right] = part
+    return whole
+
+
+def probabilities(
+    raster: Raster, model: Model, on_progress: Progress | None = None
+) -> Iterator[tuple[Window, Probability]]:
+    """The same of an image of any size, window by window; those where nothing is known are left out."""
     net = _read(model)
     image = whole_of(raster)
-    whole = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
     done_px = 0
     for window, wider in _windows(net, raster, image, OCTAVES if model.at_smaller_sizes else (), model):
         valid = raster.valid(*window)
@@ -102,11 +110,10 @@ def probability(raster: Raster, model: Model, on_progress: Progress | None = Non
             if wider:
                 quarter, half = (answer.at(window) for answer in wider)
                 _heed(logit, half, quarter)
-            _fill(whole[window.top : window.bottom, window.left : window.right], logit, valid)
+            yield window, _of_logits(logit, valid)
         done_px += window.area_px
         if on_progress is not None:
             on_progress(done_px / image.area_px)
-    return whole
 
 
 def _windows(
@@ -139,11 +146,13 @@ def _heed(logit: Logits, half: Logits, quarter: Logits) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _fill(whole: Probability, logit: Logits, valid: Mask) -> None:
+def _of_logits(logit: Logits, valid: Mask) -> Probability:
+    p = np.zeros(logit.shape, dtype=np.uint8)
     for y in range(logit.shape[0]):
         for x in range(logit.shape[1]):
-            p = np.rint(np.float32(255.0) * _sigmoid(logit[y, x]))
-            whole[y, x] = np.uint8(p) if valid[y, x] else np.uint8(0)
+            if valid[y, x]:
+                p[y, x] = np.uint8(np.rint(np.float32(255.0) * _sigmoid(logit[y, x])))
+    return p
 
 
 def _answer(net: Any, raster: Raster, window: Window, octave: int, model: Model) -> Answer:

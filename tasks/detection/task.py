@@ -7,9 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from artifacts import store
+from artifacts.mask_png import write_mask
 from artifacts.page import Page, page_key
 from artifacts.picture import mask_markdown
-from artifacts.raster import MosaicRaster, read_drawn_mask, write_mask
+from artifacts.raster import MosaicRaster, read_drawn_mask
+from schemas.bit_mask import BitMask
 from schemas.detection import DRAWN, Detection, Patterns
 from schemas.file import File
 from schemas.mosaic import Mosaic
@@ -43,7 +45,7 @@ def detect(
     with MosaicRaster(image, coverage, mosaic.name, taken_out) as raster, files.scratch() as folder:
         guest = Model(files.path(model).read_bytes(), settings.model or "model") if model else None
         found = detect_raster(raster, settings, mosaic.gsd_mm_px, patterns, progress, guest)
-        write_mask(found.mask, folder / "cracks.png")
+        write_mask(found.bits, folder / "cracks.png")
         mask = files.put(folder / "cracks.png")
         beside = []
         for n, (name, baseline) in enumerate(baselines(raster, patterns) if settings.baselines else ()):
@@ -52,7 +54,7 @@ def detect(
     return Detection(
         mask=mask,
         method=settings.method,
-        crack_px=int(found.mask.sum()),
+        crack_px=found.bits.count(),
         inspected_px=found.inspected_px,
         rejected=(
             *((joint.position_px, _reason(joint.length_px, mosaic)) for joint in found.joints),
@@ -90,6 +92,6 @@ def given_mask(mosaic: Mosaic, mask: File, name: str) -> Detection:
             "Give the mask of this very image",
         )
     with store.current().scratch() as folder:
-        write_mask(drawn, folder / "cracks.png")
+        write_mask(BitMask.of(drawn), folder / "cracks.png")
         entered = store.current().put(folder / "cracks.png")
     return Detection(mask=entered, method=DRAWN, crack_px=int(drawn.sum()), inspected_px=int(drawn.size))

@@ -4,8 +4,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
+from schemas.bit_mask import BitMask
+
 Points = npt.NDArray[np.float64]  # (N, 2) x, y in pixels
-Mask = npt.NDArray[np.bool_]  # (H, W)
 
 SMOOTH_PX = 3.0  # σ along the line: takes the staircase of pixels out, leaves the wander of a crack in
 
@@ -22,8 +23,8 @@ def smooth(points: Points, sigma_px: float = SMOOTH_PX) -> Points:
     return resample(smoothed[reach : reach + len(even)], 1.0)
 
 
-def straight_ends(points: Points, cut_px: int, mask: Mask) -> Points:
-    """The last pixels at each end replaced by a straight line on to where the (H, W) mask ends: a skeleton's
+def straight_ends(points: Points, cut_px: int, mask: BitMask) -> Points:
+    """The last pixels at each end replaced by a straight line on to where the mask ends: a skeleton's
     end turns into a corner of its mask, or stops short of its end by as much as its width."""
     if cut_px < 1 or len(points) < 6 * cut_px:
         return points
@@ -34,13 +35,13 @@ def straight_ends(points: Points, cut_px: int, mask: Mask) -> Points:
 
 
 def _straight_on(
-    start: npt.NDArray[np.float64], step: npt.NDArray[np.float64], most: int, mask: Mask
+    start: npt.NDArray[np.float64], step: npt.NDArray[np.float64], most: int, mask: BitMask
 ) -> Points:
     """Steps from the start, at most so many, that stay within the mask."""
     ahead = start + np.arange(1, most + 1)[:, None] * step
     x, y = np.rint(ahead).astype(int).T
-    inside = (x >= 0) & (y >= 0) & (x < mask.shape[1]) & (y < mask.shape[0])
-    inside[inside] = mask[y[inside], x[inside]]
+    inside = (x >= 0) & (y >= 0) & (x < mask.width_px) & (y < mask.height_px)
+    inside[inside] = mask.at(y[inside], x[inside])
     return ahead[: len(ahead) if inside.all() else int(inside.argmin())]
 
 

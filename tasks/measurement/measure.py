@@ -2,16 +2,17 @@
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
+from schemas.bit_mask import BitMask
 from schemas.raster import Progress, Raster
 from tasks.measurement.centreline import Points, arc_length, normals, orientation_deg, smooth, straight_ends
 from tasks.measurement.profiles import STEP_PX, Across, across
 from tasks.measurement.psf import estimate_psf_px
-from tasks.measurement.skeleton import Mask, Path, crack_paths
+from tasks.measurement.skeleton import Path, crack_paths
+from tasks.measurement.thickness import thickness_px
 from tasks.measurement.width_profile import Widths, measure_widths
 
 LEAST_HALF_PX = 8.0  # half length of a profile
@@ -55,15 +56,14 @@ class _Line(NamedTuple):
 
 
 def measure_cracks(
-    raster: Raster, mask: Mask, least_px: float, gap_px: float, on_progress: Progress | None = None
+    raster: Raster, mask: BitMask, least_px: float, gap_px: float, on_progress: Progress | None = None
 ) -> MeasuredImage:
-    """mask: (H, W) crack pixels of the raster. Paths shorter than `least_px` are no cracks; gaps of up to
+    """mask: crack pixels of the raster. Paths shorter than `least_px` are no cracks; gaps of up to
     `gap_px` within a crack are bridged."""
-    thickness = 2.0 * cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     lines, rejected = [], []
     paths = crack_paths(mask, least_px, gap_px)
     for n, path in enumerate(paths):
-        line = _line(raster, path, mask, thickness)
+        line = _line(raster, path, mask)
         middle = path.points[len(path.points) // 2]
         position = (float(middle[0]), float(middle[1]))
         if line.profiles.usable.sum() < 3:
@@ -81,11 +81,9 @@ def measure_cracks(
     return MeasuredImage(sorted(cracks, key=lambda crack: crack.middle_px), rejected, psf_px)
 
 
-def _line(raster: Raster, path: Path, mask: Mask, thickness: npt.NDArray[np.float32]) -> _Line:
+def _line(raster: Raster, path: Path, mask: BitMask) -> _Line:
     """Centreline through the darkest of the profiles, and the profiles across it."""
-    at = np.rint(path.points).astype(int)
-    inside = (at[:, 1] < thickness.shape[0]) & (at[:, 0] < thickness.shape[1])
-    width = float(np.percentile(thickness[at[inside, 1], at[inside, 0]], 75))
+    width = float(np.percentile(thickness_px(mask, path.points), 75))
     half = max(width + BESIDE_PX, LEAST_HALF_PX)
     coarser = max(1.0, half / FINE_HALF_PX)
     centreline = smooth(straight_ends(path.points, round(width / 2), mask))

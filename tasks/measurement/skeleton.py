@@ -6,7 +6,6 @@ branches, treated the same way. Pixels are nodes, neighbours are joined by their
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array
@@ -14,11 +13,15 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
-Mask = npt.NDArray[np.bool_]  # (H, W)
+from schemas.bit_mask import BitMask
+from tasks.connected import Indices, Marked, connected
+
 Points = npt.NDArray[np.float64]  # (N, 2) x, y in pixels
 
 FORWARD_DEG = 50.0  # a gap is bridged only where both ends point across it within this angle
 LOOK_BACK_PX = 12  # an end's direction is taken from this much of its skeleton
+TILE_PX = 2048  # of a component that is larger are thinned together
+HALO_PX = 256  # and as much around: thinning looks no further than half a crack's width
 
 
 class Path(NamedTuple):
@@ -26,16 +29,15 @@ class Path(NamedTuple):
     network: int  # paths of one connected crack share it
 
 
-def crack_paths(mask: Mask, least_px: float, gap_px: float) -> list[Path]:
+def crack_paths(mask: BitMask, least_px: float, gap_px: float) -> list[Path]:
     """Paths of at least `least_px`, longest first within each network; gaps up to `gap_px` are bridged."""
     nodes = skeleton_pixels(mask)
     if len(nodes) == 0:
         return []
     graph = _join_gaps(nodes, _neighbours(nodes), gap_px)
-    count, network = connected_components(graph, directed=False)
+    _, network = connected_components(graph, directed=False)
     paths = []
-    for n in range(count):
-        members = np.flatnonzero(network == n) if count > 1 else np.arange(len(nodes))
+    for n, members in enumerate(_members(network)):
         if len(members) < 2:
             continue
         inside = csr_array(graph[members][:, members])
@@ -43,17 +45,41 @@ def crack_paths(mask: Mask, least_px: float, gap_px: float) -> list[Path]:
     return paths
 
 
-def skeleton_pixels(mask: Mask) -> Points:
+def _members(group: npt.NDArray[np.integer]) -> list[npt.NDArray[np.intp]]:
+    """The indices of each group, from 0 up."""
+    order = np.argsort(group, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(group))[:-1])
+
+
+def skeleton_pixels(mask: BitMask) -> Points:
     """(N, 2) pixels of the skeleton, component by component so that a large image costs no memory."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    pixels = Marked.of(mask)
+    label, _ = connected(pixels)
     found = [np.empty((0, 2))]
-    for label in range(1, len(stats)):
-        x, y, width, height, _ = (int(n) for n in stats[label])
-        patch = np.pad(labels[y : y + height, x : x + width] == label, 1)
-        # Zhang's thinning, the default, eats up to 13 px of an end of an even diagonal stroke; Lee's does not
-        rows, columns = np.nonzero(skeletonize(patch, method="lee"))  # type: ignore[no-untyped-call]
-        found.append(np.column_stack([columns + x - 1, rows + y - 1]).astype(np.float64))
+    for index in _members(label)[1:]:
+        found += _thinned(pixels.y[index], pixels.x[index])
     return np.concatenate(found)
+
+
+def _thinned(y: Indices, x: Indices) -> list[Points]:
+    """Skeleton pixels of the component that has these pixels, row by row; tile by tile where it is large."""
+    parts = []
+    low, high = int(x.min()), int(x.max()) + 1
+    for top in range(int(y[0]), int(y[-1]) + 1, TILE_PX):
+        rows = slice(*np.searchsorted(y, (top - HALO_PX, top + TILE_PX + HALO_PX)))
+        for left in range(low, high, TILE_PX):
+            here = (x[rows] >= left - HALO_PX) & (x[rows] < left + TILE_PX + HALO_PX)
+            if not here.any():
+                continue
+            yy, xx = y[rows][here], x[rows][here]
+            y0, x0 = int(yy[0]) - 1, int(xx.min()) - 1
+            patch = np.zeros((int(yy[-1]) - y0 + 2, int(xx.max()) - x0 + 2), dtype=bool)
+            patch[yy - y0, xx - x0] = True
+            # Zhang's, the default, eats up to 13 px of an end of an even diagonal stroke; Lee's does not
+            v, u = np.nonzero(skeletonize(patch, method="lee"))  # type: ignore[no-untyped-call]
+            own = (v + y0 >= top) & (v + y0 < top + TILE_PX) & (u + x0 >= left) & (u + x0 < left + TILE_PX)
+            parts.append(np.column_stack([u + x0, v + y0])[own].astype(np.float64))
+    return parts
 
 
 def _neighbours(nodes: Points) -> csr_array:
@@ -129,10 +155,8 @@ def _longest_paths(graph: csr_array, least_px: float) -> list[npt.NDArray[np.int
             continue
         found.append(members[path])
         left = np.setdiff1d(np.arange(len(members)), path)
-        count, part = connected_components(csr_array(inside[left][:, left]), directed=False)
-        sizes = np.bincount(part, minlength=count)
-        order = np.argsort(part, kind="stable")
-        for some in np.split(order, np.cumsum(sizes)[:-1]):
+        _, part = connected_components(csr_array(inside[left][:, left]), directed=False)
+        for some in _members(part):
             if len(some) >= least_px / 1.5:  # a step is at most √2 px
                 waiting.append(members[left[some]])
     return found

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from artifacts import store
+from artifacts.mask_png import read_mask
 from artifacts.page import Page, page_key
 from artifacts.picture import lines_markdown
-from artifacts.raster import MosaicRaster, TiffWindows, read_mask
+from artifacts.raster import MosaicRaster, TiffWindows
 from schemas.crack import Crack, Measurement
 from schemas.detection import DRAWN, Detection, Patterns
 from schemas.mosaic import Mosaic
@@ -50,7 +51,7 @@ def measure(
     least_px = settings.least_px(None if detection.method == DRAWN else gsd, side_px)
     image, coverage = files.path(mosaic.image), files.path(mosaic.coverage)
     with MosaicRaster(image, coverage, mosaic.name, files.path(patterns.mask)) as raster:
-        mask = read_mask(files.path(detection.mask), mosaic.name) > 0
+        mask = read_mask(files.path(detection.mask), mosaic.name)
         found = measure_cracks(raster, mask, least_px, GAP_LENGTHS * least_px, progress)
     photos = _photos(mosaic, files.path(mosaic.source), found.cracks)
     cracks = tuple(

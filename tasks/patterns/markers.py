@@ -12,7 +12,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from schemas.bit_mask import BitMask
 from schemas.raster import Pixels
+from tasks.connected import regions
 
 BIN = 4  # Lab units of a cell of the colour histogram
 APART = 25.0  # least distance of a marker's peak from the surface's, Lab units: another colour to anyone
@@ -71,24 +73,27 @@ def marker_pixels(lab: Pixels, peaks: ColourPeaks) -> Mask:
     return mask
 
 
-def compact_patches(mask: Mask, margin_px: int) -> Mask:
+def compact_patches(mask: BitMask, margin_px: int) -> BitMask:
     """The patches of `mask` that are large and compact enough for a marker, grown by the margin."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    kept = np.zeros(mask.shape, dtype=np.uint8)
-    for label in range(1, count):
-        x, y, width, height, area = (int(n) for n in stats[label])
-        if not LEAST_PX <= area <= max(LEAST_PX, LARGEST_SHARE * mask.size):
-            continue
-        patch = (labels[y : y + height, x : x + width] == label).astype(np.uint8)
+    found = regions(mask)
+    largest = max(LEAST_PX, LARGEST_SHARE * mask.height_px * mask.width_px)
+    chosen = (found.area_px >= LEAST_PX) & (found.area_px <= largest)
+    chosen[0] = False
+    kept = BitMask(mask.height_px, mask.width_px)
+    reach = 2 * margin_px + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+    for y, x in found.pixels(chosen):
+        top, left = int(y.min()) - margin_px, int(x.min()) - margin_px
+        patch = np.zeros((int(y.max()) - top + margin_px + 1, int(x.max()) - left + margin_px + 1), np.uint8)
+        patch[y - top, x - left] = 1
         outline, _ = cv2.findContours(patch, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         hull = cv2.convexHull(np.concatenate(outline))
         filled = cv2.fillConvexPoly(np.zeros_like(patch), hull, 1)
         cv2.drawContours(patch, outline, -1, 1, cv2.FILLED)  # a drawing within the marker belongs to it
         if patch.sum() >= SOLID * filled.sum():
-            kept[y : y + height, x : x + width] |= patch
-    reach = 2 * margin_px + 1
-    grown = cv2.dilate(kept, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
-    return np.asarray(grown > 0)
+            v, u = np.nonzero(cv2.dilate(patch, disc))
+            kept.set(v + top, u + left)
+    return kept
 
 
 def _centre(cell: npt.NDArray[np.intp]) -> npt.NDArray[np.float64]:

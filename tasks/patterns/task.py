@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from artifacts import store
+from artifacts.mask_png import write_mask
 from artifacts.page import Page, page_key
 from artifacts.picture import mask_markdown
-from artifacts.raster import MosaicRaster, write_mask
+from artifacts.raster import MosaicRaster
 from schemas.detection import Patterns
 from schemas.mosaic import Mosaic
 from schemas.settings import PatternSettings
@@ -49,7 +50,7 @@ def remove_patterns(mosaic: Mosaic, settings: PatternSettings) -> Patterns:
         blank_px=found.blank_px,
         outside_px=found.outside_px,
         pattern_px=found.pattern_px,
-        inspectable_px=int((~found.masked).sum()),
+        inspectable_px=mosaic.width_px * mosaic.height_px - found.masked.count(),
     )
 
 

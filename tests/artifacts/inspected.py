@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import tifffile
 
+from artifacts.mask_png import write_mask
+from schemas.bit_mask import BitMask
 from schemas.crack import Crack, Measurement, WidthSample
 from schemas.crack_report import CrackReport, SurfaceInspected
 from schemas.detection import Detection, Patterns
@@ -302,5 +304,5 @@ def _tiff(shelf: Shelf, path: Path, pixels: npt.NDArray[Any]):
 
 
 def _png(shelf: Shelf, path: Path, pixels: Pixels):
-    cv2.imwrite(str(path), pixels)
+    write_mask(BitMask.of(pixels > 0), path)
     return shelf.put(path)

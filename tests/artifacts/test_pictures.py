@@ -19,6 +19,7 @@ from artifacts.mosaic_view import HATCH, MosaicView, Window, reduced_mask
 from artifacts.orthographic import Canvas, View
 from artifacts.surface_sheet import simplified, strips, ticks
 from artifacts.view3d import Scene, cloud_picture, has_underside, nice_length, picture
+from schemas.bit_mask import BitMask
 from schemas.problem import BadInput
 from tests.artifacts.bridge import write_ply
 from tests.artifacts.inspected import Inspected
@@ -187,10 +188,10 @@ def test_reduction_keeps_the_mean_and_the_place(bridge: Inspected, size: tuple[i
 @settings(max_examples=60)
 def test_a_single_mask_pixel_is_never_lost(height: int, width: int, h: int, w: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    mask = np.zeros((height, width), np.uint8)
+    mask = np.zeros((height, width), bool)
     y, x = rng.integers(height), rng.integers(width)
-    mask[y, x] = 255
-    small = reduced_mask(mask, (w, h))
+    mask[y, x] = True
+    small = reduced_mask(BitMask.of(mask), Window(0, 0, width, height), (w, h))
     assert small.sum() == 1
     found_y, found_x = np.argwhere(small)[0]
     assert abs((found_y + 0.5) / small.shape[0] - (y + 0.5) / height) <= 1 / small.shape[0]

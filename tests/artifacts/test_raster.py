@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import tifffile
 
+from artifacts.mask_png import write_mask
 from artifacts.page import page_key
-from artifacts.raster import MosaicRaster, TiffWindows, read_drawn_mask, read_mask, write_mask
+from artifacts.raster import MosaicRaster, TiffWindows, read_drawn_mask
+from schemas.bit_mask import BitMask
 from schemas.problem import BadInput
 
 RNG = np.random.default_rng(0)
@@ -43,12 +45,11 @@ def test_valid_is_covered_and_not_masked(tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "c.tif", covered, tile=(32, 32))
     masked = np.zeros((50, 60), dtype=bool)
     masked[:, :5] = True
-    write_mask(masked, tmp_path / "m.png")
-    assert (read_mask(tmp_path / "m.png", "wall") == np.where(masked, 255, 0)).all()
+    write_mask(BitMask.of(masked), tmp_path / "m.png")
     with MosaicRaster(tmp_path / "i.tif", tmp_path / "c.tif", "wall", tmp_path / "m.png") as raster:
         valid = raster.valid(0, 50, 0, 60)
     assert (valid == ((covered > 0) & ~masked)).all()
-    write_mask(masked[:40], tmp_path / "short.png")
+    write_mask(BitMask.of(masked[:40]), tmp_path / "short.png")
     with pytest.raises(BadInput, match="differ in size"):
         MosaicRaster(tmp_path / "i.tif", tmp_path / "c.tif", "wall", tmp_path / "short.png")
 

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from schemas.bit_mask import BitMask
 from schemas.raster import ArrayRaster
 from tasks.measurement.centreline import resample, smooth
 from tasks.measurement.measure import measure_cracks
@@ -41,7 +42,7 @@ def turns() -> Iterator[Row]:
 def _turns_of(masks: list[Mask], data: str) -> Iterator[Row]:
     turned: dict[int, list[float]] = {chord: [] for chord in CHORDS_PX}
     for mask in masks:
-        for path in crack_paths(mask, LEAST_PX, GAP_PX):
+        for path in crack_paths(BitMask.of(mask), LEAST_PX, GAP_PX):
             line = resample(smooth(path.points, STAIRCASE_PX), 1.0)
             for chord in CHORDS_PX:
                 steps = np.diff(line[::chord], axis=0)
@@ -59,7 +60,7 @@ def widths() -> Iterator[Row]:
         for seed in SEEDS:
             wall = cracked_wall(seed, width_px, DEPTH_RMS)
             known = cv2.dilate(wall.truth.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-            found = measure_cracks(ArrayRaster(wall.rgb), known, LEAST_PX, GAP_PX).cracks
+            found = measure_cracks(ArrayRaster(wall.rgb), BitMask.of(known), LEAST_PX, GAP_PX).cracks
             crack = max(found, key=lambda one: one.length_px)
             true_px = float(np.median(_middle(wall.crack.left_m + wall.crack.right_m))) / PX_M
             if crack.widths.is_upper_bound:

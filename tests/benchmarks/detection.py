@@ -21,11 +21,12 @@ from flows.console import out
 from flows.evaluate_command import ALL, as_table
 from schemas.settings import DetectSettings
 from tasks.assessment.evaluation import evaluate, near, tally
+from tasks.connected import Marked
 from tasks.detection.components import components
 from tasks.detection.detect import detect_image
 from tasks.detection.network import OUR_LIMITS, Model, our_model
 from tasks.detection.sauvola import grey_of, sauvola
-from tests.benchmarks import crack_rows, wall_rows
+from tests.benchmarks import crack_rows, large_mosaic_rows, wall_rows
 from tests.benchmarks.table import Row, absent, gather, row
 from tests.development_data import ROOT
 from training.photos import FOLDS, by_fold
@@ -215,8 +216,9 @@ def false_on_photos() -> Iterator[Row]:
             mask = detect_image(rgb, None, ALL["hairline"], GSD_MM_PX).mask
             drawn = near(truth, NEAR_PX)
             free_px += int((~drawn).sum())
-            pieces = components(mask)
-            on_drawn = np.bincount(pieces.labels[drawn], minlength=len(pieces.area_px)) / pieces.area_px
+            pieces = components(Marked.of_levels(mask.view(np.uint8)))
+            label = pieces.label[drawn[pieces.pixels.y, pieces.pixels.x]]
+            on_drawn = np.bincount(label, minlength=len(pieces.area_px)) / np.maximum(pieces.area_px, 1)
             found += int((on_drawn[1:] < 0.5).sum())
         area_m2 = free_px * (GSD_MM_PX / 1000) ** 2
         data = f"{area_m2:.1f} m² of {name}, {GSD_MM_PX} mm/px assumed"
@@ -259,6 +261,7 @@ PARTS = {
     "walls": wall_rows.rows,
     "turns": crack_rows.turns,
     "widths": crack_rows.widths,
+    "size": large_mosaic_rows.rows,
 }
 
 if __name__ == "__main__":

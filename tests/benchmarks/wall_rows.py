@@ -83,7 +83,7 @@ def uneven_light() -> Iterator[Row]:
             far = ~(cv2.dilate(dark.truth.astype(np.uint8), np.ones((31, 31), np.uint8)) > 0)
             along_edge_px += int((centreline(found) & dark.shadow_edge & far).sum())
             painted = cracked_wall(seed, 3.0, 8.0, marker=True)
-            valid = ~remove(ArrayRaster(painted.rgb), None, PatternSettings()).masked
+            valid = ~remove(ArrayRaster(painted.rgb), None, PatternSettings()).masked.whole()
             marked.append(count(found_on(painted.rgb, method, GSD_MM_PX, valid), painted.truth & valid, 2))
         f1 = [scores(_summed(counts)).f1 for counts in (even, shaded, marked)]
         bar = "≤ 0.02" if method == "hairline" else None

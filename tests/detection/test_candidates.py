@@ -2,11 +2,26 @@ import cv2
 import numpy as np
 import pytest
 
-from tasks.detection.candidates import candidates, features, strength
-from tasks.detection.components import components
-from tasks.detection.network import OUR_LIMITS, USUAL_LIMITS
+from tasks.connected import Marked
+from tasks.detection import candidates as judged
+from tasks.detection.candidates import Candidates, features, strength
+from tasks.detection.components import Components, components
+from tasks.detection.network import OUR_LIMITS, USUAL_LIMITS, Limits
 
-EDGE, SURE = OUR_LIMITS
+SURE = OUR_LIMITS.sure
+
+
+def candidates(p: np.ndarray, limits: Limits) -> Candidates:
+    return judged.candidates(likely(p, limits), limits)
+
+
+def likely(p: np.ndarray, limits: Limits = OUR_LIMITS) -> Marked:
+    return Marked.of_levels(np.where(p >= limits.edge, p, np.uint8(0)))
+
+
+def label_at(found: Components, y: int, x: int) -> int:
+    (one,) = np.flatnonzero((found.pixels.y == y) & (found.pixels.x == x))
+    return int(found.label[one])
 
 
 def line(levels: tuple[int, ...], length: int = 60) -> np.ndarray:
@@ -19,9 +34,9 @@ def line(levels: tuple[int, ...], length: int = 60) -> np.ndarray:
 
 def test_strength_is_that_of_the_middle_and_not_of_the_rim() -> None:
     p = line((130, 250, 250, 130))
-    assert strength(components(p >= EDGE), p)[1] == pytest.approx(250 / 255)
+    assert strength(components(likely(p)))[1] == pytest.approx(250 / 255)
     p = line((200, 200, 200))
-    assert strength(components(p >= EDGE), p)[1] == pytest.approx(200 / 255)
+    assert strength(components(likely(p)))[1] == pytest.approx(200 / 255)
 
 
 def test_a_candidate_needs_a_pixel_that_is_sure() -> None:
@@ -46,9 +61,9 @@ def test_bend_is_least_for_a_ruled_line_and_none_for_a_ring() -> None:
     wave = np.column_stack([np.arange(10, 290), 120 + 15 * np.sin(np.arange(280) / 30)])
     cv2.polylines(p, [np.rint(wave).astype(np.int32)], False, 250, 3)
     cv2.circle(p, (150, 175), 18, 250, 2)
-    found = components(p >= EDGE)
+    found = components(likely(p))
     of_line, of_wave, of_ring = (
-        features(found, p)[found.labels[y, x], 1] for x, y in ((10, 20), (10, 120), (168, 175))
+        features(found)[label_at(found, y, x), 1] for x, y in ((10, 20), (10, 120), (168, 175))
     )
     assert of_line < -4.0 < of_wave < -1.0 < of_ring <= 0.0
 

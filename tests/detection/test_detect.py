@@ -139,7 +139,8 @@ def test_half_in_shade_finds_the_same_crack() -> None:
     assert found_share(ours, truth) > 0.9 and false_px(ours, truth) == 0
     paper = detect_image(rgb, None, PAPER, 1.0).mask
     assert false_px(paper, truth) < 50
-    named = dict(baselines(ArrayRaster(rgb), Peaks(peaks=(75, 150), i_surface=150)))
+    given = baselines(ArrayRaster(rgb), Peaks(peaks=(75, 150), i_surface=150))
+    named = {name: mask.whole() for name, mask in given}
     assert set(named) == {"T = 125", "T = 155", "from the peaks", "Otsu"}
     assert false_px(named["T = 125"], truth) > 50_000
 

@@ -4,7 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tasks.detection.joints import straight_run, without_joints
+from tasks.connected import Marked
+from tasks.detection.joints import Joint, straight_run
+from tasks.detection.joints import without_joints as of_pixels
+
+
+def without_joints(mask: np.ndarray, joint_px: float, piece_px: float) -> tuple[np.ndarray, list[Joint]]:
+    left, joints = of_pixels(Marked.of_levels(mask.astype(np.uint8)), joint_px, piece_px)
+    return left.mask.whole(), joints
 
 
 def line(angle_deg: float, length: float, thickness: int, size: int = 700) -> np.ndarray:

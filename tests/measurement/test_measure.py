@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from schemas.bit_mask import BitMask
 from schemas.raster import ArrayRaster
 from schemas.settings import DetectSettings
 from tasks.detection.detect import detect_image
@@ -14,7 +15,7 @@ from tests.measurement.drawn_crack import Drawn, drawn_crack
 
 def measured(drawn: Drawn) -> MeasuredImage:
     mask = detect_image(drawn.rgb, None, DetectSettings(method="ridge"), None).mask
-    return measure_cracks(ArrayRaster(drawn.rgb), mask, 30, 15)
+    return measure_cracks(ArrayRaster(drawn.rgb), BitMask.of(mask), 30, 15)
 
 
 @pytest.mark.parametrize("darkness", [0.4, 0.7])
@@ -34,7 +35,7 @@ def test_width_of_a_gaping_crack(width: float) -> None:
     drawn = drawn_crack(lambda x: 0 * x + width, size=(500, 700))
     y, x = np.mgrid[:500, :700]
     mask = np.abs(y - np.interp(x, drawn.x, drawn.y)) < width / 2 - 1
-    (crack,) = measure_cracks(ArrayRaster(drawn.rgb), mask, 30, 15).cracks
+    (crack,) = measure_cracks(ArrayRaster(drawn.rgb), BitMask.of(mask), 30, 15).cracks
     assert crack.widths.width_px.mean() == pytest.approx(width, rel=0.005, abs=0.5)
     assert crack.widths.width_px.std() < 1.5
 
@@ -47,7 +48,9 @@ def test_a_thin_crack_as_jagged_as_real_ones_is_not_taken_for_a_wide_pale_one(
     """width: about its median. Some of its profiles look wide and pale by noise."""
     wall = cracked_wall(seed, width, 10.0)
     known = cv2.dilate(wall.truth.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    crack = max(measure_cracks(ArrayRaster(wall.rgb), known, 30, 15).cracks, key=lambda one: one.length_px)
+    crack = max(
+        measure_cracks(ArrayRaster(wall.rgb), BitMask.of(known), 30, 15).cracks, key=lambda one: one.length_px
+    )
     found = float(np.median(crack.widths.width_px))
     unresolved = crack.widths.is_upper_bound and width < found < 3.0
     assert unresolved or found == pytest.approx(width, abs=0.5)
@@ -60,7 +63,8 @@ def test_no_end_of_a_crack_looks_wider_than_its_middle(width: float) -> None:
         wall = cracked_wall(seed, width, 10.0)
         known = cv2.dilate(wall.truth.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         (crack, *_) = sorted(
-            measure_cracks(ArrayRaster(wall.rgb), known, 30, 15).cracks, key=lambda one: -one.length_px
+            measure_cracks(ArrayRaster(wall.rgb), BitMask.of(known), 30, 15).cracks,
+            key=lambda one: -one.length_px,
         )
         assert np.quantile(crack.widths.width_px, 0.99) < 1.6 * np.median(crack.widths.width_px) + 0.5
 
@@ -71,7 +75,7 @@ def test_a_stretch_that_is_filled_keeps_its_width() -> None:
     rgb = dark.rgb.copy()
     rgb[:, 200:300] = pale.rgb[:, 200:300]
     mask = np.abs(np.mgrid[:160, :480][0] - np.interp(np.arange(480), dark.x, dark.y)) < 3
-    (crack,) = measure_cracks(ArrayRaster(rgb), mask, 30, 15).cracks
+    (crack,) = measure_cracks(ArrayRaster(rgb), BitMask.of(mask), 30, 15).cracks
     filled = np.abs(crack.centreline[:, 0] - 250) < 35
     assert np.median(crack.widths.width_px[filled]) == pytest.approx(6.0, abs=0.3)
 
@@ -137,22 +141,22 @@ def test_gaps_are_bridged_and_order_is_by_position() -> None:
     for x0, x1, y in ((20, 150, 60), (160, 380, 62), (250, 380, 150)):
         cv2.line(mask, (x0, y), (x1, y), 1, 3)
     rgb = np.where(mask[..., None] > 0, 60, 160).astype(np.uint8).repeat(3, 2)
-    found = measure_cracks(ArrayRaster(rgb), mask > 0, 30, 15).cracks
+    found = measure_cracks(ArrayRaster(rgb), BitMask.of(mask > 0), 30, 15).cracks
     assert [round(c.middle_px[0] / 10) for c in found] == [20, 32]
     assert found[0].length_px == pytest.approx(360, abs=6)
-    apart = measure_cracks(ArrayRaster(rgb), mask > 0, 30, 5).cracks
+    apart = measure_cracks(ArrayRaster(rgb), BitMask.of(mask > 0), 30, 5).cracks
     assert len(apart) == 3
 
 
 def test_nothing_and_next_to_nothing() -> None:
     rgb = np.full((50, 60, 3), 128, np.uint8)
-    assert measure_cracks(ArrayRaster(rgb), np.zeros((50, 60), bool), 30, 15).cracks == []
+    assert measure_cracks(ArrayRaster(rgb), BitMask(50, 60), 30, 15).cracks == []
     dot = np.zeros((50, 60), bool)
     dot[10, 10] = True
-    assert measure_cracks(ArrayRaster(rgb), dot, 30, 15).cracks == []
+    assert measure_cracks(ArrayRaster(rgb), BitMask.of(dot), 30, 15).cracks == []
     line = np.zeros((50, 60), bool)
     line[25, 5:55] = True
-    found = measure_cracks(ArrayRaster(rgb), line, 30, 15)
+    found = measure_cracks(ArrayRaster(rgb), BitMask.of(line), 30, 15)
     assert found.cracks == [] and "no darker" in found.rejected[0][1]
 
 

@@ -4,8 +4,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from schemas.bit_mask import BitMask
 from tasks.measurement.centreline import arc_length, orientation_deg, resample, simplify, smooth
-from tasks.measurement.skeleton import crack_paths
+from tasks.measurement.skeleton import Path
+from tasks.measurement.skeleton import crack_paths as of_bits
 
 
 def strokes(*lines: tuple[tuple[int, int], tuple[int, int]], thickness: int = 3) -> np.ndarray:
@@ -13,6 +15,10 @@ def strokes(*lines: tuple[tuple[int, int], tuple[int, int]], thickness: int = 3)
     for a, b in lines:
         cv2.line(mask, a, b, 1, thickness)
     return mask > 0
+
+
+def crack_paths(mask: np.ndarray, least_px: float, gap_px: float) -> list[Path]:
+    return of_bits(BitMask.of(mask), least_px, gap_px)
 
 
 def length(points: np.ndarray) -> float:
