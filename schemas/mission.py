@@ -12,6 +12,9 @@ MOUNT_MODE_TARGETING = float(mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 MOST_ITEMS = 650  # ArduPilot answers MAV_MISSION_NO_SPACE to more
 GROUND_SPEED = float(mavlink.SPEED_TYPE_GROUNDSPEED)
 GIMBAL_RATE_DEG_S = 30.0  # slow end of what drone gimbals do
+# The shortest hold that ArduPilot keeps. Without any ArduCopter does not stop at a waypoint but rounds the
+# corner (ModeAuto::set_next_wp, SCurve), up to WPNAV_RADIUS off the planned path: 2 m as delivered.
+STOP_S = 1.0
 
 
 class MissionItem(Contract):
@@ -39,7 +42,8 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
     ArduPilot starts the commands that follow a waypoint when it leaves it, and turns the nose along the path
     on every new leg. So gimbal and yaw of a waypoint are commanded on the way to it, and a shooting point is
     a waypoint with a hold (longer where the turn takes longer than the leg), then CONDITION_YAW once more,
-    which holds the trigger behind it back until the nose is within 2°.
+    which holds the trigger behind it back until the nose is within 2°. Every other waypoint has a hold too:
+    where the vehicle does not stop, it leaves the path that is known to be free.
     """
     if len(plan.flights) > 1:
         raise BadInput("plan", f"it has {len(plan.flights)} flights", "Name the one to fly.")
@@ -84,12 +88,12 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
         if waypoint.kind == "shooting":
             on_the_way_s = math.dist(here, waypoint.position_m) / plan.vehicle.speed_m_s
             wait_s = max(0.0, turn_s - on_the_way_s, tilt_s - on_the_way_s)
-            hold_s = float(math.ceil(plan.vehicle.hold_s + wait_s))  # ArduPilot keeps whole seconds
+            hold_s = max(STOP_S, math.ceil(plan.vehicle.hold_s + wait_s))  # ArduPilot keeps whole seconds
             add(mavlink.MAV_CMD_NAV_WAYPOINT, waypoint.position_m, param1=hold_s)
             face(waypoint.yaw_deg)
             add(mavlink.MAV_CMD_DO_DIGICAM_CONTROL, photo=waypoint.photo, x=1)  # x is "shoot"
         else:
-            add(mavlink.MAV_CMD_NAV_WAYPOINT, waypoint.position_m)
+            add(mavlink.MAV_CMD_NAV_WAYPOINT, waypoint.position_m, param1=STOP_S)
         facing = waypoint.kind == "shooting"
         here, yaw_deg = waypoint.position_m, waypoint.yaw_deg
     add(mavlink.MAV_CMD_NAV_LAND, plan.home_m)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from schemas.camera import Camera
 from schemas.contract import Vector3
 from schemas.flight_plan import Waypoint
-from schemas.mission import MOST_ITEMS
+from schemas.mission import MOST_ITEMS, STOP_S
 from schemas.vehicle import Vehicle
 from tasks.planning.route import Stop, Ways
 from tasks.planning.timing import landing_s, path_s, shooting_s, turn_s
@@ -53,7 +53,7 @@ def flights(
     usable = vehicle.endurance_s * (1 - vehicle.reserve)
     between = ways.along(stops[1:])
     home = _Home(stops, ways)
-    up_and_down = 2 * path_s(np.array([home_m, stops[0].place_m]), vehicle)
+    up_and_down = 2 * (path_s(np.array([home_m, stops[0].place_m]), vehicle) + STOP_S)
     up_and_down += landing_s(float(stops[0].place_m[2]) - home_m[2])
     made = []
     first = 1

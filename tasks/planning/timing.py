@@ -9,6 +9,7 @@ import numpy.typing as npt
 from schemas.camera import Camera
 from schemas.contract import Vector3
 from schemas.flight_plan import Waypoint
+from schemas.mission import STOP_S
 from schemas.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -35,15 +36,16 @@ def path_length_m(home_m: Vector3, waypoints: Sequence[Waypoint]) -> float:
 
 
 def path_s(path_m: Array, vehicle: Vehicle) -> float:
-    """Seconds along the corners (P, 3) of a path, a full stop at each."""
-    return float(travel_s(np.linalg.norm(np.diff(path_m, axis=0), axis=1), vehicle).sum())
+    """Seconds along the corners (P, 3) of a path, with the stop at each between its ends."""
+    stops_s = STOP_S * max(0, len(path_m) - 2)
+    return float(travel_s(np.linalg.norm(np.diff(path_m, axis=0), axis=1), vehicle).sum()) + stops_s
 
 
 def shooting_s(turn: float, on_the_way: float, vehicle: Vehicle, camera: Camera) -> float:
     """Seconds at a shooting point: settling, longer where the turn outlasts the way there, in whole seconds
     as missions hold, and never shorter than the camera's interval."""
     hold = math.ceil(vehicle.hold_s + max(0.0, turn - on_the_way))
-    return max(float(hold), 1.0 / camera.max_rate_hz)
+    return max(STOP_S, hold, 1.0 / camera.max_rate_hz)
 
 
 def landing_s(height_m: float) -> float:
@@ -68,6 +70,8 @@ def shot_times_s(
             seconds += shooting_s(turn, on_the_way, vehicle, camera)
             times.append(seconds)
             yaw, on_the_way = waypoint.yaw_deg, 0.0
+        else:
+            seconds += STOP_S
     return np.array(times), seconds
 
 

@@ -4,7 +4,7 @@ Commands run as ArduCopter runs them (AP_Mission): the DO and CONDITION items th
 when the vehicle leaves it, one after the other; CONDITION_YAW holds back those behind it until the nose is
 within 2°; what is still waiting when the next waypoint is reached is dropped. Without a commanded yaw the
 nose turns along the path, and without a commanded speed it flies at its own. A mission that orders its items
-badly therefore takes bad photos here too.
+badly therefore takes bad photos here too, and one that does not stop at a waypoint rounds the corner.
 
 Time is virtual: everything depends on the mission, the vehicle and the seed alone.
 """
@@ -30,6 +30,7 @@ LAG_S = 0.12  # of each of the two first-order stages with which the vehicle fol
 SHUTTER_DELAY_S = 0.05  # from the trigger to the exposure
 GIMBAL_RATE_DEG_S = 45.0
 OWN_SPEED_M_S = 10.0  # ArduCopter's WPNAV_SPEED as delivered
+ROUNDING_M = 2.0  # its WPNAV_RADIUS as delivered
 YAW_REACHED_DEG = 2.0  # ArduCopter's verify_yaw
 TOUCHDOWN_S = 1.0  # from the ground contact to the motors' stop
 BIAS_S, JITTER_S = 60.0, 0.5  # memory of the slow position error, which walks over minutes, and of the quick
@@ -94,14 +95,15 @@ class _Axis:
 def fly_mission(
     items: tuple[MissionItem, ...], origin: GeoOrigin, home_m: Vector3, vehicle: Vehicle, seed: int
 ) -> Flown:
-    """Fly the mission: straight legs with a stop at each waypoint, limited acceleration and yaw rate, at the
-    speed that the mission commands. Take-off climbs at the vehicle's."""
+    """Fly the mission: straight legs, limited acceleration and yaw rate, at the speed that the mission
+    commands. Take-off climbs at the vehicle's. A waypoint without a hold before another is flown past: as in
+    ArduCopter (SCurve::advance_target_along_track) the next leg starts while this one brakes."""
     yaw, pitch = _Axis(vehicle.yaw_rate_deg_s), _Axis(GIMBAL_RATE_DEG_S)
     position = np.asarray(home_m, dtype=float)
     reference = [position[None]]
     triggers: list[tuple[MissionItem, float]] = []
     reached: list[tuple[int, float]] = []
-    now, speed_m_s = 0.0, OWN_SPEED_M_S
+    now, speed_m_s, braking = 0.0, OWN_SPEED_M_S, 0
     for before, item in _legs(items):
         for command in before:
             if command.command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
@@ -113,7 +115,15 @@ def fly_mission(
         landing = item.command == mavlink.MAV_CMD_NAV_LAND  # flies over the place, then comes down
         corners = [position, over, target] if landing else [position, target]
         leg = np.vstack([_ramp(a, b, top_m_s, vehicle.acceleration_m_s2) for a, b in pairwise(corners)])
-        hold_s = item.param1 or 0.0 if item.command == mavlink.MAV_CMD_NAV_WAYPOINT else 0.0
+        waypoint = item.command == mavlink.MAV_CMD_NAV_WAYPOINT
+        hold_s = (item.param1 or 0.0) if waypoint else 0.0
+        ramp = _ramp_steps(float(np.linalg.norm(target - position)), top_m_s, vehicle.acceleration_m_s2)
+        if braking and waypoint:
+            both = min(braking, ramp)
+            reference[-1][-both:] += leg[:both] - position
+            leg, now = leg[both:], now - both * STEP_S
+            reached[-1] = (reached[-1][0], now)
+        braking = ramp if waypoint and hold_s == 0.0 else 0
         if landing:
             hold_s = TOUCHDOWN_S
         leg = np.vstack([leg, np.repeat(target[None], round(hold_s / STEP_S), axis=0)])
@@ -159,6 +169,12 @@ def _target(item: MissionItem, position: Array, origin: GeoOrigin, home_m: Vecto
         east, north = position[0], position[1]
     height = 0.0 if item.command == mavlink.MAV_CMD_NAV_LAND else _single(item.z)
     return np.array([east, north, home_m[2] + height])
+
+
+def _ramp_steps(distance_m: float, speed_m_s: float, acceleration_m_s2: float) -> int:
+    """Steps of a leg's acceleration, as of its braking, of which two legs can share as many at a corner."""
+    ramp_s = min(speed_m_s / acceleration_m_s2, np.sqrt(distance_m / acceleration_m_s2))
+    return int(min(ramp_s, 2 * np.sqrt(ROUNDING_M / acceleration_m_s2)) / STEP_S)
 
 
 def _ramp(start: Array, end: Array, speed_m_s: float, acceleration_m_s2: float) -> Array:

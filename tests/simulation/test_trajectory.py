@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from schemas.flight_plan import FlightPlan
+from schemas.flight_plan import FlightPlan, Waypoint
 from schemas.mission import MissionItem, mission_items
 from schemas.vehicle import Vehicle
 from tasks.simulation.trajectory import GUST_M, STEP_S, Flown, fly_mission
@@ -106,6 +106,25 @@ def test_takes_off_and_lands_at_home() -> None:
     for end in (0, -1):
         assert np.linalg.norm(f.true_m[end] - plan.home_m) < 5 * GUST_M
     assert f.true_m[:, 2].max() == pytest.approx(4.0, abs=5 * GUST_M)
+
+
+def test_stops_at_every_waypoint_and_rounds_those_without_a_hold() -> None:
+    """As ArduCopter, which is then off the path, the only place that is known to be free."""
+    plan = wall_plan(vehicle=exact(hold_s=0.0))
+    corner = Waypoint(kind="intermediate", position_m=(4.0, -10.0, 4.0), yaw_deg=0.0)
+    plan = plan.model_copy(update={"waypoints": (plan.waypoints[0], corner, *plan.waypoints[1:])})
+    corners = (corner, plan.waypoints[5])  # and the end of the wall's first row, after a short leg
+    waypoint = mavlink.MAV_CMD_NAV_WAYPOINT
+    careless = tuple(
+        i.model_copy(update={"param1": 0.0}) if i.command == waypoint else i for i in mission_items(plan)
+    )
+    stops, rounds = flown(plan), flown(plan, items=careless)
+    for way, rounded_m in zip(corners, (0.3, 0.08), strict=True):
+        off_m = [np.linalg.norm(f.estimated_m - way.position_m, axis=1).min() for f in (stops, rounds)]
+        assert off_m[0] < 0.05 < rounded_m < off_m[1] < 2.0
+    step_m = np.linalg.norm(np.diff(rounds.estimated_m, axis=0), axis=1)
+    assert step_m.max() < (2.0 + 6 * GUST_M) * STEP_S
+    assert rounds.reached[-1][1] < stops.reached[-1][1]
 
 
 def test_a_mission_without_yaw_commands_looks_along_its_path() -> None:
