@@ -10,6 +10,7 @@ from tasks.flight.link import Link, LinkLost
 
 RESEND_S = 0.25
 BASE_S, ITEM_S = 20.0, 0.5  # an upload may take this long, and this long an item
+CLEAR_S = 12.0  # ArduPilot clears nothing until 8 s after the last item of an upload that stopped halfway
 WINDOW = 8  # items asked for at once when reading back
 ACCEPTED, ERROR = mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_ERROR
 OUT_OF_ORDER, CANCELLED = mavlink.MAV_MISSION_INVALID_SEQUENCE, mavlink.MAV_MISSION_OPERATION_CANCELLED
@@ -40,7 +41,8 @@ def upload_mission(link: Link, items: tuple[MissionItem, ...]) -> None:
 
 def clear_mission(link: Link) -> bool:
     """Empty the vehicle's mission; says whether the vehicle confirmed."""
-    for _ in range(20):
+    until = time.monotonic() + CLEAR_S
+    while time.monotonic() < until:
         link.mav.mission_clear_all_send(*link.target)
         ack = link.expect(("MISSION_ACK",), RESEND_S, lambda m: m.type == ACCEPTED)
         if ack is not None:

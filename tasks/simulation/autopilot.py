@@ -5,6 +5,7 @@ from mission and seed and told as fast as the link takes it, every message with 
 """
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,7 @@ STABILIZE, AUTO, GUIDED = 0, 3, 4  # ArduCopter's modes
 CAPACITY = 700  # mission items
 BANNER = "ArduCopter simulated by Hairline"
 TELEMETRY_S = 0.1
+UPLOAD_S = 8.0  # an upload is given up so long after its last item (MissionItemProtocol's upload_timeout_ms)
 BOOT_MS = 30_000  # vehicle's clock when it arms
 
 
@@ -61,8 +63,8 @@ class Autopilot:
         self._send_bytes = send
         self._loss = np.random.default_rng([seed, 0x6C6F7373])
         self.mission: list[MissionItem] = []
-        self.incoming: list[MissionItem] = []
-        self.expected = 0  # items of the upload in progress; 0: none
+        self.expected = self.received = 0  # items of the upload in progress; expected 0: none
+        self._heard_s = 0.0  # when the upload went on last
         self.armed, self.mode = False, STABILIZE
         self._refused_modes = 0
 
@@ -97,9 +99,12 @@ class Autopilot:
         )
 
     def on_ground(self) -> None:
-        """What it tells every second while it waits; it also asks again for a mission item."""
+        """What it tells every second while it waits; it also asks again for a mission item, or gives up."""
         self.heartbeat()
-        if self.expected:
+        if self.expected and time.monotonic() - self._heard_s > UPLOAD_S:
+            self.expected = 0
+            self._mission_ack(mavlink.MAV_MISSION_OPERATION_CANCELLED)
+        elif self.expected:
             self._ask()
         self._stand()
 
@@ -115,39 +120,45 @@ class Autopilot:
         if message.count > CAPACITY:
             self._mission_ack(mavlink.MAV_MISSION_NO_SPACE)
             return
-        self.mission, self.incoming, self.expected = [], [], message.count
+        del self.mission[message.count :]  # the others stay until they are replaced
+        self.expected, self.received, self._heard_s = message.count, 0, time.monotonic()
         self._ask()
 
     def _ask(self) -> None:
-        self.send(
-            self.mav.mission_request_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, len(self.incoming))
-        )
+        self.send(self.mav.mission_request_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, self.received))
 
     def _on_mission_item_int(self, message: Any) -> None:
         if not self.expected:
             self._mission_ack(mavlink.MAV_MISSION_ERROR)
-        elif message.seq != len(self.incoming):
+        elif message.seq != self.received:
             self._mission_ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
         else:
             refusal = _refusal(message)
             if refusal is not None:
-                self.expected = 0
-                self.mission = self.incoming  # as ArduPilot: what came so far stays
+                self.expected = 0  # what came so far stays
                 self._mission_ack(refusal)
                 return
-            self.incoming.append(_stored(message))
-            if len(self.incoming) < self.expected:
+            self.mission[message.seq : message.seq + 1] = [_stored(message)]
+            self.received, self._heard_s = self.received + 1, time.monotonic()
+            if self.received < self.expected:
                 self._ask()
             else:
                 self.expected = 0
-                self.mission = self.incoming[: -1 if self.faults.lose_last_item else None]
+                if self.faults.lose_last_item:
+                    self.mission.pop()
                 self._mission_ack(mavlink.MAV_MISSION_ACCEPTED)
 
     def _on_mission_clear_all(self, message: Any) -> None:
-        self.mission, self.incoming, self.expected = [], [], 0
+        if self.expected:  # MissionItemProtocol::handle_mission_clear_all
+            self._mission_ack(mavlink.MAV_MISSION_ERROR)
+            return
+        self.mission.clear()
         self._mission_ack(mavlink.MAV_MISSION_ACCEPTED)
 
     def _on_mission_request_list(self, message: Any) -> None:
+        if self.expected:
+            self._mission_ack(mavlink.MAV_MISSION_DENIED)
+            return
         self.send(self.mav.mission_count_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, len(self.mission)))
 
     def _on_mission_request_int(self, message: Any) -> None:

@@ -1,4 +1,5 @@
 import time
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -79,6 +80,22 @@ def test_uploads_or_leaves_nothing_behind() -> None:
             upload_mission(link, (*ITEMS[:6], bad, *ITEMS[7:]))
         assert read_back(link) == ()  # nothing half-uploaded stays
         assert clear_mission(link)
+
+
+def test_an_interrupted_upload_leaves_nothing_behind() -> None:
+    """ArduPilot refuses to clear a mission as long as it waits for the rest of one."""
+    with start_vehicle(PLAN, 1) as url, Link(url, 5.0) as link:
+        link.find_vehicle()
+
+        def interrupt(message: Any) -> None:
+            if message.get_type() == "MISSION_REQUEST" and message.seq == 5:
+                link.on_message = None
+                raise KeyboardInterrupt
+
+        link.on_message = interrupt
+        with pytest.raises(KeyboardInterrupt):
+            upload_mission(link, ITEMS)
+        assert read_back(link) == ()
 
 
 def test_a_mission_that_reads_back_differently_is_cleared() -> None:

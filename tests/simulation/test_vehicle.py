@@ -82,7 +82,7 @@ def test_takes_a_mission_as_ardupilot_does() -> None:
         (6, 9999, 0, mavlink.MAV_MISSION_UNSUPPORTED),
     ],
 )
-def test_refuses_items_with_ardupilots_codes_and_keeps_the_truncated_mission(
+def test_refuses_items_with_ardupilots_codes_and_keeps_a_mixture_of_missions(
     frame: int, command: int, x: int, result: int
 ) -> None:
     station = Station()
@@ -92,7 +92,17 @@ def test_refuses_items_with_ardupilots_codes_and_keeps_the_truncated_mission(
     assert of_type(station.say(good), "MISSION_REQUEST")
     bad = station.mav.mission_item_int_encode(1, 1, 1, frame, command, 0, 1, 0, 0, 0, 0, x, 0, 0.0)
     assert station.say(bad)[0].type == result
-    assert station.say(station.mav.mission_request_list_encode(1, 1))[0].count == 1
+    assert station.say(station.mav.mission_request_list_encode(1, 1))[0].count == 5
+    told = station.say(station.mav.mission_request_int_encode(1, 1, 4))[0]
+    assert told.command == ITEMS[4].command  # of the mission before
+
+
+def test_neither_clears_nor_tells_a_mission_while_it_receives_one() -> None:
+    station = Station()
+    station.say(station.mav.mission_count_encode(1, 1, 5))
+    assert station.say(station.mav.mission_clear_all_encode(1, 1))[0].type == mavlink.MAV_MISSION_ERROR
+    listed = station.say(station.mav.mission_request_list_encode(1, 1))[0]
+    assert listed.type == mavlink.MAV_MISSION_DENIED
 
 
 def test_tells_the_flight_that_it_flies() -> None:
