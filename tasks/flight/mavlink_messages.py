@@ -17,6 +17,7 @@ READ = (  # message ids; a log's other messages need not be decoded
     mavlink.MAVLINK_MSG_ID_STATUSTEXT,
 )
 EXPOSURES = ("CAMERA_FEEDBACK", "CAMERA_IMAGE_CAPTURED")
+PERIPHERALS = range(100, 255)  # component ids of cameras, gimbals, radios; autopilots have 1
 REBOOT_S = 5.0  # a clock this far back is a new boot
 
 
@@ -140,7 +141,9 @@ class MessageReader:
 
 
 def is_autopilot(heartbeat: Any) -> bool:
-    """Whether this heartbeat comes from a flying vehicle's autopilot, not from a station, gimbal or radio."""
+    """Whether this heartbeat comes from a flying vehicle's autopilot, never a station, gimbal or camera."""
+    if heartbeat.get_srcComponent() in PERIPHERALS:  # which not all call their autopilot invalid
+        return False
     return heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID and heartbeat.type not in (
         mavlink.MAV_TYPE_GCS,
         mavlink.MAV_TYPE_GIMBAL,

@@ -27,19 +27,20 @@ def udp_link(timeout_s: float = 3.0) -> Iterator[tuple[Link, socket.socket, tupl
         yield link, vehicle, ("127.0.0.1", port)
 
 
-def heartbeat(system: int, kind: int, autopilot: int, mode: int = 0) -> bytes:
-    mav = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
+def heartbeat(system: int, kind: int, autopilot: int, mode: int = 0, component: int = 1) -> bytes:
+    mav = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
     return bytes(mav.heartbeat_encode(kind, autopilot, 0, mode, 0).pack(mav))
 
 
 COPTER = heartbeat(1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mode=7)
 STATION = heartbeat(255, mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID)
+CAMERA = heartbeat(1, mavlink.MAV_TYPE_GENERIC, mavlink.MAV_AUTOPILOT_GENERIC, component=100)
 OTHER = heartbeat(9, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mode=8)
 
 
 def test_listens_to_the_first_autopilot_only_whatever_else_arrives() -> None:
     with udp_link() as (link, vehicle, address):
-        for data in (os.urandom(200), STATION, b"\xfd\x09", *[COPTER] * 30):
+        for data in (os.urandom(200), STATION, CAMERA, b"\xfd\x09", *[COPTER] * 30):
             vehicle.sendto(data, address)
         assert link.find_vehicle().custom_mode == 7
         assert link.target == (1, 1)
