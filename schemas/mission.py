@@ -83,6 +83,7 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
             tilt_s = abs(waypoint.pitch_deg - pitch_deg) / GIMBAL_RATE_DEG_S
             pitch_deg = waypoint.pitch_deg
             add(mavlink.MAV_CMD_DO_MOUNT_CONTROL, param1=pitch_deg, z=MOUNT_MODE_TARGETING)
+            facing = False  # up to 4.5 ArduCopter turns the nose to north where the gimbal does not pan
         if not facing or turn_s > 0.0:
             face(waypoint.yaw_deg)
         if waypoint.kind == "shooting":

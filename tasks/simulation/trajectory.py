@@ -140,6 +140,7 @@ def fly_mission(
                 loop = max(loop, done - YAW_REACHED_DEG / vehicle.yaw_rate_deg_s)
             elif command.command == mavlink.MAV_CMD_DO_MOUNT_CONTROL:
                 pitch.turn(loop, _single(command.param1))
+                yaw.turn(loop, origin.yaw_deg(_single(command.param3)))  # as Copter up to 4.5 does
             elif command.command == mavlink.MAV_CMD_DO_DIGICAM_CONTROL and command.x == 1:
                 triggers.append((command, loop + SHUTTER_DELAY_S))
             loop += STEP_S

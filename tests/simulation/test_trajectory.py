@@ -135,6 +135,17 @@ def test_a_mission_without_yaw_commands_looks_along_its_path() -> None:
     assert [round(s.true_pose.yaw_deg / 90) % 4 for s in f.shots[1:3]] == [1, 1]  # east, not north
 
 
+def test_a_change_of_pitch_alone_does_not_turn_the_nose() -> None:
+    """Up to 4.5 ArduCopter takes the yaw of DO_MOUNT_CONTROL, 0, for a heading if the gimbal does not pan."""
+    plan = wall_plan(2, 1, exact())
+    ways = [w.model_copy(update={"yaw_deg": 90.0}) for w in plan.waypoints]
+    ways[2] = ways[2].model_copy(update={"pitch_deg": 40.0})
+    plan = plan.model_copy(update={"waypoints": tuple(ways)})
+    for shot, way in zip(flown(plan).shots, plan.shooting_points, strict=True):
+        assert abs(shot.estimated_pose.yaw_deg - 90.0) < 2.5
+        assert np.linalg.norm(np.subtract(shot.estimated_pose.position_m, way.position_m)) < 5 * GUST_M
+
+
 def test_a_late_turn_delays_the_trigger_until_the_nose_is_there() -> None:
     """CONDITION_YAW holds the trigger back while the vehicle already leaves for the next point."""
     plan = wall_plan(1, 1, exact(yaw_rate_deg_s=45.0))
