@@ -5,7 +5,7 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from schemas.contract import Contract, Vector3
-from schemas.flight_plan import FlightPlan
+from schemas.flight_plan import FlightPlan, Waypoint
 from schemas.problem import BadInput
 
 MOUNT_MODE_TARGETING = float(mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING)
@@ -35,7 +35,8 @@ class MissionItem(Contract):
 
 
 def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
-    """The mission of a plan of one flight: home, take-off, the speed, each waypoint, landing at home.
+    """The mission of a plan of one flight: home, take-off, a stop above home, the speed, each waypoint,
+    landing at home.
 
     Raises BadInput for a plan of several flights, and for more items than a vehicle takes.
 
@@ -73,10 +74,16 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
     add(mavlink.MAV_CMD_NAV_WAYPOINT, plan.home_m)  # item 0 is home by ArduPilot's convention
     here, yaw_deg, pitch_deg = _above_home(plan), 0.0, 0.0
     add(mavlink.MAV_CMD_NAV_TAKEOFF, here)
-    # Else the vehicle flies at its own WPNAV_SPEED, 10 m/s as delivered, which nothing was planned for.
-    add(mavlink.MAV_CMD_DO_CHANGE_SPEED, param1=GROUND_SPEED, param2=plan.vehicle.speed_m_s)
+    waypoints = plan.waypoints
+    if waypoints and (waypoints[0].position_m != here or waypoints[0].kind == "shooting"):
+        above = Waypoint(kind="intermediate", position_m=here, yaw_deg=waypoints[0].yaw_deg)
+        waypoints = (above, *waypoints)
     facing = False  # whether a command on this leg already holds the nose at yaw_deg
-    for waypoint in plan.waypoints:
+    for number, waypoint in enumerate(waypoints):
+        if number == 1:
+            # Else the vehicle flies at its own WPNAV_SPEED, 10 m/s as delivered, which nothing was planned
+            # for. Between take-off and a first waypoint Copter 4.1 to 4.4 forgets it (ArduPilot issue 21080).
+            add(mavlink.MAV_CMD_DO_CHANGE_SPEED, param1=GROUND_SPEED, param2=plan.vehicle.speed_m_s)
         turn_s = abs((waypoint.yaw_deg - yaw_deg + 180.0) % 360.0 - 180.0) / plan.vehicle.yaw_rate_deg_s
         tilt_s = 0.0
         if waypoint.kind == "shooting" and waypoint.pitch_deg != pitch_deg:

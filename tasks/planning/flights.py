@@ -18,7 +18,7 @@ from tasks.planning.viewpoints import View
 
 Array = npt.NDArray[np.float64]
 
-ITEMS_AROUND = 5  # home, take-off, speed, the way back and the landing
+ITEMS_AROUND = 7  # home, take-off, yaw and stop above home, speed, the way back and the landing
 MOST_ITEMS_A_SHOT = 5  # gimbal, yaw, waypoint, yaw, trigger
 ITEMS_A_CORNER = 2
 

@@ -104,10 +104,11 @@ def fly_mission(
     triggers: list[tuple[MissionItem, float]] = []
     reached: list[tuple[int, float]] = []
     now, speed_m_s, braking = 0.0, OWN_SPEED_M_S, 0
+    climbs = False
     for before, item in _legs(items):
         for command in before:
-            if command.command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
-                speed_m_s = _single(command.param2)
+            if command.command == mavlink.MAV_CMD_DO_CHANGE_SPEED and not climbs:
+                speed_m_s = _single(command.param2)  # right after a climb Copter 4.1 to 4.4 forgets it
         climbs = item.command == mavlink.MAV_CMD_NAV_TAKEOFF
         top_m_s = vehicle.speed_m_s if climbs else speed_m_s
         target = _target(item, position, origin, home_m)

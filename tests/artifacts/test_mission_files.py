@@ -63,12 +63,14 @@ def test_a_plan_comes_back_item_by_item(write, read, name: str, tmp_path: Path) 
 
 
 def test_every_mission_flies_at_the_planned_speed(tmp_path: Path) -> None:
-    """Commanded right after take-off: ArduPilot's own speed is 10 m/s."""
+    """Commanded before it leaves the place above home, but not right after take-off, where Copter 4.1 to 4.4
+    forgets it: ArduPilot's own speed is 10 m/s."""
     plan = a_plan().model_copy(update={"vehicle": Vehicle(speed_m_s=1.5)})
     write_missions(plan, tmp_path / "mission")
     for mission in (read_waypoints(tmp_path / "mission.waypoints"), read_plan(tmp_path / "mission.plan")):
-        take_off, speed = mission.items[:2]
-        assert (take_off.command, speed.command) == (22, 178)
+        take_off, _yaw, above, speed = mission.items[:4]
+        assert [i.command for i in mission.items[:4]] == [22, 115, 16, 178]
+        assert (above.x, above.y, above.z) == (take_off.x, take_off.y, take_off.z)
         assert (speed.param1, speed.param2) == (1.0, 1.5)  # over the ground, m/s
     assert read_plan(tmp_path / "mission.plan").speed_m_s == 1.5
     with ZipFile(tmp_path / "mission.kmz") as archive:
