@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from artifacts.run_folder import lay_out
 from flows.command_line import app
 from flows.console import err
 from flows.plain_files import (
@@ -48,6 +49,7 @@ def fly(
     """
     from flows.results import write_flight
     from schemas.flight_plan import FlightPlan
+    from tasks.flight.task import FlightCutShort
     from tasks.flight.task import fly as fly_plan
 
     flights = read_contract(plan, FlightPlan).each_flight
@@ -55,7 +57,11 @@ def fly(
         raise BadInput("--flight", f"there is no flight {flight}", f"The plan has {len(flights)}")
     planned = flights[flight - 1]
     with working(out):
-        log = fly_plan.bare(planned, mission, connection, timeout_s)
+        try:
+            log = fly_plan.bare(planned, mission, connection, timeout_s)
+        except FlightCutShort as cut:
+            lay_out(out, {"flight.mcap": cut.archive}, copy=True)
+            raise cut.kept_in(out / "flight.mcap") from None
         write_flight(out, log, copy=True)
     of = f"flight {flight} of {len(flights)}: " if len(flights) > 1 else ""
     say(f"{of}{len(log.shots)} photos in {log.duration_s / 60:.1f} min: {out / 'flight.mcap'}")

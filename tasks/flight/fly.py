@@ -41,11 +41,11 @@ AIRBORNE_M = 0.5
 
 
 class FlightLost(Exception):
-    """The link broke in flight; what was recorded until then."""
+    """The flight is no longer followed: the link broke, or Ctrl-C. recording: what was received so far."""
 
-    def __init__(self, recording: Recording) -> None:
-        super().__init__(recording)
-        self.recording = recording
+    def __init__(self, recording: Recording, interrupted: bool = False) -> None:
+        super().__init__(recording, interrupted)
+        self.recording, self.interrupted = recording, interrupted
 
 
 class Flight:
@@ -128,7 +128,7 @@ class Flight:
         """Arm, fly, follow to disarming; everything from the arming on goes to the recorder.
 
         Raises BadInput where the flight does not begin (the mission is cleared then), FlightLost where the
-        link breaks in the air.
+        link breaks in the air, or Ctrl-C ends the following: the vehicle flies on by itself.
         """
         try:
             self._arm(recorder)
@@ -143,6 +143,8 @@ class Flight:
             self._follow(on_progress)
         except LinkLost:
             raise FlightLost(self.reader.close()) from None
+        except KeyboardInterrupt:
+            raise FlightLost(self.reader.close(), interrupted=True) from None
         recording = self.reader.close()
         if max((fix.height_m for fix in recording.fixes), default=0.0) < AIRBORNE_M:
             self._stand_down()

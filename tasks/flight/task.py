@@ -15,10 +15,24 @@ from schemas.problem import BadInput
 from tasks.stage import progress, stage
 
 if TYPE_CHECKING:
+    from tasks.flight.fly import FlightLost
     from tasks.flight.read_log import Kind
     from tasks.flight.recording import Recording
 
 ARCHIVE = "flight.mcap"
+
+
+class FlightCutShort(BadInput):
+    """A flight that was not followed to its end. archive: what was received until then, kept at `kept`."""
+
+    def __init__(self, connection: str, what: str, then: str, archive: File, kept: Path) -> None:
+        remedy = f"{then}. What was received is kept in {kept}; with the vehicle's own log, continue as an"
+        super().__init__(connection, what, f"{remedy} external flight")
+        self.args = (connection, what, then, archive, kept)
+        self.then, self.archive = then, archive
+
+    def kept_in(self, path: Path) -> "FlightCutShort":
+        return FlightCutShort(self.item, self.what, self.then, self.archive, path)
 
 
 def flight_pages(inputs: Mapping[str, Any], log: FlightLog) -> Sequence[Page]:
@@ -65,7 +79,7 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
             with FlightArchive(path, _about(vehicle, "mavlink", plan)) as recorder:
                 recording = flight.execute(recorder, progress)
         except FlightLost as lost:
-            raise _lost(connection, timeout_s, lost.recording, store.current().put(path)) from None
+            raise _cut_short(connection, timeout_s, lost, store.current().put(path)) from None
         recording.vehicle = vehicle
         return _flight_log(recording, store.current().put(path), plan, connection)
 
@@ -155,11 +169,13 @@ def _about(vehicle: str, kind: str, plan: FlightPlan) -> dict[str, str]:
     }
 
 
-def _lost(connection: str, timeout_s: float, recording: "Recording", archive: File) -> BadInput:
-    flown_s = recording.fixes[-1].time_s - recording.fixes[0].time_s if recording.fixes else 0.0
-    return BadInput(
-        connection,
-        f"the vehicle was not heard for {timeout_s:g} s, {flown_s:.0f} s after arming",
-        "It follows its own failsafe. What was received is kept in"
-        f" {store.current().path(archive)}; with the vehicle's own log, continue as an external flight",
-    )
+def _cut_short(connection: str, timeout_s: float, lost: "FlightLost", archive: File) -> FlightCutShort:
+    fixes = lost.recording.fixes
+    flown_s = fixes[-1].time_s - fixes[0].time_s if fixes else 0.0
+    if lost.interrupted:
+        what = f"following the flight was interrupted, {flown_s:.0f} s after arming"
+        then = "The vehicle flies its mission on by itself: to stop it, take over by radio or ground station"
+    else:
+        what = f"the vehicle was not heard for {timeout_s:g} s, {flown_s:.0f} s after arming"
+        then = "It follows its own failsafe"
+    return FlightCutShort(connection, what, then, archive, store.current().path(archive))

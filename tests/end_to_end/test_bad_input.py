@@ -4,7 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from artifacts.flight_log import messages
+from tasks.simulation.autopilot import Faults
+from tasks.simulation.vehicle import start_vehicle
 from tests.end_to_end.commands import hairline
+from tests.flight.wall_plan import wall_plan
 from tests.small_inspection import write_inspection
 
 
@@ -39,6 +43,17 @@ def test_a_vehicle_that_never_answers_is_told_in_time(tmp_path: Path) -> None:
     words = ("fly", "plan.json", "--connection", "udpin:127.0.0.1:14999", "--timeout-s", "2", "--out", "out")
     result = hairline(*words, cwd=tmp_path, expect=2, timeout_s=60)
     assert "14999" in result.stderr
+
+
+def test_what_was_received_of_a_flight_outlives_the_command(tmp_path: Path) -> None:
+    plan = wall_plan(2, 1)
+    (tmp_path / "plan.json").write_text(plan.model_dump_json())
+    with start_vehicle(plan, 3, Faults(vanish_s=20.0)) as url:
+        words = ("fly", "plan.json", "--connection", url, "--timeout-s", "2", "--out", "out")
+        result = hairline(*words, cwd=tmp_path, expect=2, timeout_s=120)
+    said = " ".join(result.stderr.split())
+    assert "kept in out/flight.mcap" in said
+    assert next(messages(tmp_path / "out" / "flight.mcap"))[0]
 
 
 def test_an_unknown_key_is_told_before_anything_starts(tmp_path: Path) -> None:

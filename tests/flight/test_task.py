@@ -1,8 +1,11 @@
 """Whole flights on the simulated vehicle: client and vehicle are two processes on a real socket."""
 
+import itertools
+import pickle
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +19,8 @@ from schemas.mission import mission_items
 from schemas.problem import BadInput
 from tasks.flight.fly import Flight
 from tasks.flight.link import Link
-from tasks.flight.task import convert, fly, import_log
+from tasks.flight.recording import archive
+from tasks.flight.task import FlightCutShort, convert, fly, import_log
 from tasks.flight.upload import read_back
 from tasks.simulation.autopilot import Faults
 from tasks.simulation.trajectory import fly_mission
@@ -107,6 +111,26 @@ def test_a_link_lost_in_flight_keeps_what_was_archived() -> None:
     assert part.duration_s == pytest.approx(30.0, abs=0.3)
     assert part.shots
     assert part.missed
+
+
+def test_an_interrupted_flight_keeps_what_was_archived_and_says_that_the_vehicle_flies_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    archived = itertools.count()
+
+    def interrupted(*args: Any) -> None:
+        archive(*args)
+        if next(archived) == 900:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("tasks.flight.fly.archive", interrupted)
+    flies_on = r"interrupted, \d+ s after arming\. The vehicle flies its mission on.*take over"
+    with start_vehicle(PLAN, 3) as url, pytest.raises(FlightCutShort, match=flies_on) as problem:
+        fly.bare(PLAN, "1", url, 5.0)
+    part = import_log.bare(problem.value.archive, "flight.mcap", PLAN)
+    assert part.shots
+    assert part.missed
+    assert str(pickle.loads(pickle.dumps(problem.value))) == str(problem.value)
 
 
 def test_a_silent_vehicle_is_named() -> None:
