@@ -69,6 +69,7 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
     """
     from tasks.flight.fly import Flight, FlightLost
     from tasks.flight.link import Link
+    from tasks.flight.telling import Teller
 
     items = mission_items(plan)
     with store.current().scratch() as folder, Link(connection, timeout_s) as link:
@@ -76,8 +77,11 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
         vehicle = flight.prepare()
         path = folder / ARCHIVE
         try:
-            with FlightArchive(path, _about(vehicle, "mavlink", plan)) as recorder:
-                recording = flight.execute(recorder, progress)
+            with (
+                FlightArchive(path, _about(vehicle, "mavlink", plan)) as recorder,
+                Teller(progress) as tell,
+            ):
+                recording = flight.execute(recorder, tell)
         except FlightLost as lost:
             raise _cut_short(connection, timeout_s, lost, store.current().put(path)) from None
         recording.vehicle = vehicle

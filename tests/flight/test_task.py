@@ -3,6 +3,7 @@
 import itertools
 import pickle
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -131,6 +132,22 @@ def test_an_interrupted_flight_keeps_what_was_archived_and_says_that_the_vehicle
     assert part.shots
     assert part.missed
     assert str(pickle.loads(pickle.dumps(problem.value))) == str(problem.value)
+
+
+def test_a_dashboard_that_hangs_or_fails_does_not_keep_the_flight_waiting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[float] = []
+
+    def dashboard(fraction: float) -> None:
+        told.append(fraction)
+        time.sleep(0.5)
+        raise ConnectionError
+
+    monkeypatch.setattr("tasks.flight.task.progress", dashboard)
+    with start_vehicle(PLAN, 3) as url:
+        assert not fly.bare(PLAN, "1", url, 5.0).missed
+    assert 1 <= len(told) < len(PLAN.waypoints)
 
 
 def test_a_silent_vehicle_is_named() -> None:
