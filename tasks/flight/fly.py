@@ -213,7 +213,7 @@ class Flight:
         abandon_mission(self.link)
 
     def _problem(self, what: str) -> BadInput:
-        said = "; ".join(dict.fromkeys(self.warnings[-5:]))
+        said = "; ".join(dict.fromkeys(text.strip() for text in self.warnings[-5:]))
         return BadInput(
             self.link.url,
             f"{what}; it says: {said}" if said else what,
@@ -225,7 +225,10 @@ class Flight:
     def _on_message(self, message: Any) -> None:
         kind = message.get_type()
         if kind == "STATUSTEXT" and message.severity <= mavlink.MAV_SEVERITY_WARNING:
-            self.warnings.append(message.text.strip())
+            if message.chunk_seq and self.warnings:  # more than 50 characters come in pieces
+                self.warnings[-1] += message.text
+            else:
+                self.warnings.append(message.text)
         elif kind == "COMMAND_ACK" and self._recorder is None and _armed(message):
             self._recorder = self._next_recorder
             self.reader.recording.fixes.clear()

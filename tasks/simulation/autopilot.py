@@ -23,6 +23,7 @@ SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
 STABILIZE, AUTO, GUIDED = 0, 3, 4  # ArduCopter's modes
 CAPACITY = 700  # mission items
 BANNER = "ArduCopter simulated by Hairline"
+YAW_WRONG = "Arm: AHRS: EKF3 Yaw inconsistent 34 deg. Wait or reboot"
 TELEMETRY_S = 0.1
 UPLOAD_S = 8.0  # an upload is given up so long after its last item (MissionItemProtocol's upload_timeout_ms)
 BOOT_MS = 30_000  # vehicle's clock when it arms
@@ -112,7 +113,10 @@ class Autopilot:
         self._position(0.0, self.home_m, 0.0, (0.0, 0.0, 0.0))
 
     def _say(self, text: str, severity: int = mavlink.MAV_SEVERITY_INFO) -> None:
-        self.send(self.mav.statustext_encode(severity, text.encode()[:50]))
+        """In pieces where it is long, as GCS::send_textv does."""
+        pieces = [text[i : i + 50].encode() for i in range(0, len(text), 50)]
+        for number, piece in enumerate(pieces):
+            self.send(self.mav.statustext_encode(severity, piece, int(len(pieces) > 1), number))
 
     # -- mission protocol ------------------------------------------------------------------------------
 
@@ -223,6 +227,7 @@ class Autopilot:
     def _arm(self) -> int:
         if self.faults.refuse_arm:
             self._say("PreArm: Compass not calibrated", mavlink.MAV_SEVERITY_CRITICAL)
+            self._say(YAW_WRONG, mavlink.MAV_SEVERITY_CRITICAL)
             return int(mavlink.MAV_RESULT_FAILED)
         if not self.armed:
             self.armed = True

@@ -83,7 +83,8 @@ def test_a_truncated_archive_gives_what_it_has(log: FlightLog, tmp_path: Path) -
 
 def test_a_vehicle_that_refuses_to_arm_says_why_and_keeps_no_mission() -> None:
     with start_vehicle(PLAN, 1, Faults(refuse_arm=True)) as url:
-        with pytest.raises(BadInput, match=r"refuses to arm.*PreArm: Compass not calibrated") as problem:
+        said = r"refuses to arm.*PreArm: Compass not calibrated; Arm: .* 34 deg\. Wait or reboot\."
+        with pytest.raises(BadInput, match=said) as problem:
             fly.bare(PLAN, "1", url, 1.5)
         assert problem.value.item == url
         with Link(url, 5.0) as link:
