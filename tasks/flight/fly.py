@@ -13,7 +13,7 @@ from schemas.problem import BadInput
 from tasks.flight.link import Link, LinkLost
 from tasks.flight.mavlink_messages import MessageReader, vehicle_name
 from tasks.flight.place import Place
-from tasks.flight.recording import Recorder, Recording, archive
+from tasks.flight.recording import Fix, Recorder, Recording, archive
 from tasks.flight.upload import abandon_mission, upload_mission
 
 AUTO, GUIDED = 3, 4  # ArduCopter's modes
@@ -110,7 +110,10 @@ class Flight:
                 "the vehicle does not know where it is",
                 "Wait until it has a GPS position, then fly the plan again",
             )
-        x, y, _ = self.place.world_m(fixes[-1])
+        self._check_stand(fixes[-1])
+
+    def _check_stand(self, fix: Fix) -> None:
+        x, y, _ = self.place.world_m(fix)
         off_m = math.hypot(x - self.plan.home_m[0], y - self.plan.home_m[1])
         if off_m > self.off_home_m:
             latitude, longitude, altitude = self.plan.origin.to_geographic(self.plan.home_m)
@@ -132,7 +135,7 @@ class Flight:
         """
         try:
             self._arm(recorder)
-            self._check_height()
+            self._check_armed()
             self._start()
         except LinkLost:
             raise FlightLost(self.reader.close()) from None
@@ -171,12 +174,17 @@ class Flight:
         custom = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         return bool(self.link.command(mavlink.MAV_CMD_DO_SET_MODE, custom, mode) == ACCEPTED)
 
-    def _check_height(self) -> None:
-        """On arming an ArduCopter sets its home where it stands, unless somebody has set another."""
-        told = self.link.expect(("GLOBAL_POSITION_INT",), self.link.timeout_s)
-        if told is None:
+    def _check_armed(self) -> None:
+        """Place again, which satellite receivers just switched on know badly; and height: on arming an
+        ArduCopter sets its home where it stands, unless somebody has set another."""
+        fixes = self.reader.recording.fixes
+        until = time.monotonic() + self.link.timeout_s
+        while not fixes and time.monotonic() < until:
+            self.link.receive(0.2)
+        if not fixes:
             raise self._problem("the vehicle does not tell its height")
-        height_m = told.relative_alt / 1000.0
+        self._check_stand(fixes[-1])
+        height_m = fixes[-1].height_m
         if abs(height_m) > self.off_home_m:
             raise BadInput(
                 self.link.url,
@@ -184,7 +192,7 @@ class Flight:
                 f" off by as much, and {self.off_home_m:g} m are allowed",
                 "Restart it at the plan's home, or set its home there, then fly the plan again",
             )
-        self.reader.recording.fixes.clear()  # those of before the flight
+        fixes.clear()  # those of before the flight
 
     def _start(self) -> None:
         if not self._set_mode(AUTO):

@@ -39,6 +39,7 @@ class Faults:
     settling: int = 0  # so often it refuses to leave its mode: its position is not good enough yet
     lose_last_item: bool = False  # of an uploaded mission
     home_off_m: float = 0.0  # its own home, from which it counts heights, lies as far above the ground
+    drift_m: float = 0.0  # as far north of where it stood does it stand after arming
     vanish_s: float | None = None  # the link ends at this time of the flight
 
 
@@ -110,7 +111,9 @@ class Autopilot:
         self._stand()
 
     def _stand(self) -> None:
-        self._position(0.0, self.home_m, 0.0, (0.0, 0.0, 0.0))
+        east, north, up = self.home_m
+        drifted_m = self.faults.drift_m if self.armed else 0.0
+        self._position(0.0, (east, north + drifted_m, up), 0.0, (0.0, 0.0, 0.0))
 
     def _say(self, text: str, severity: int = mavlink.MAV_SEVERITY_INFO) -> None:
         """In pieces where it is long, as GCS::send_textv does."""

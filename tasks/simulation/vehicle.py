@@ -42,6 +42,7 @@ def start_vehicle(plan: FlightPlan, seed: int, faults: Faults | None = None) -> 
     command = [sys.executable, "-m", "tasks.simulation.vehicle", "--port", "0", "--seed", str(seed)]
     command += ["--airframe", airframe.model_dump_json(), "--loss", str(faults.loss)]
     command += ["--settling", str(faults.settling), "--home-off-m", str(faults.home_off_m)]
+    command += ["--drift-m", str(faults.drift_m)]
     command += [f"--{name.replace('_', '-')}" for name in _SWITCHES if getattr(faults, name)]
     if faults.vanish_s is not None:
         command += ["--vanish-s", str(faults.vanish_s)]
@@ -84,6 +85,7 @@ def main() -> None:
     parser.add_argument("--vanish-s", type=float, help="end the link at this time of the flight")
     parser.add_argument("--settling", type=int, default=0, help="refuse as many changes of mode")
     parser.add_argument("--home-off-m", type=float, default=0.0, help="heights count from above the ground")
+    parser.add_argument("--drift-m", type=float, default=0.0, help="it stands farther north after arming")
     for switch in _SWITCHES:
         parser.add_argument(f"--{switch.replace('_', '-')}", action="store_true")
     options = parser.parse_args()
@@ -99,6 +101,7 @@ def main() -> None:
         settling=options.settling,
         lose_last_item=options.lose_last_item,
         home_off_m=options.home_off_m,
+        drift_m=options.drift_m,
         vanish_s=options.vanish_s,
     )
     with socket.create_server(("127.0.0.1", options.port)) as server:

@@ -172,6 +172,14 @@ def test_a_vehicle_farther_from_home_than_the_clearance_does_not_arm(
         fly.bare(moved(north_m), "1", vehicle, 5.0)
 
 
+def test_a_vehicle_whose_position_settles_elsewhere_before_it_arms_does_not_take_off() -> None:
+    with start_vehicle(PLAN, 1, Faults(drift_m=2.5)) as url:
+        with pytest.raises(BadInput, match=r"stands 2\.5 m from the plan's home"):
+            fly.bare(PLAN, "1", url, 5.0)
+        with Link(url, 5.0) as link:
+            assert not link.find_vehicle().base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
 def test_a_vehicle_within_the_clearance_of_home_may_fly(vehicle: str) -> None:
     near = moved(0.9)
     with Link(vehicle, 5.0) as link:
