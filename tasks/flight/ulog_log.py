@@ -36,15 +36,15 @@ def read_ulog(path: Path) -> Recording:
     if position is None:
         return recording
     time_s, latitude, longitude, altitude = position
-    home = topics.get("home_position")
-    ground_m = float(home["alt"][-1]) if home is not None and len(home["alt"]) else float(altitude[0])
     yaw = _yaw_deg(topics, time_s)
-    for values in zip(time_s, latitude, longitude, altitude, altitude - ground_m, yaw, strict=True):
+    height = altitude - _ground_m(topics, time_s, float(altitude[0]))
+    for values in zip(time_s, latitude, longitude, altitude, height, yaw, strict=True):
         recording.add(Fix(*(float(v) for v in values)))
     recording.armed_s = _armed(topics)
     captures = topics.get("camera_capture")
     if captures is not None:
         turned = np.column_stack([captures[f"q[{i}]"] for i in range(4)])
+        ground_m = _ground_m(topics, captures["timestamp"] / 1e6, float(altitude[0]))
         for i, stamp in enumerate(captures["timestamp"]):
             heading, pitch = yaw_and_pitch_deg(turned[i])
             alt = float(captures["alt"][i])
@@ -53,7 +53,7 @@ def read_ulog(path: Path) -> Recording:
                 float(captures["lat"][i]),
                 float(captures["lon"][i]),
                 alt,
-                alt - ground_m,
+                alt - float(ground_m[i]),
                 heading,
             )
             recording.triggers.append(Trigger(fix, pitch, int(captures["seq"][i])))
@@ -84,6 +84,17 @@ def _positions(topics: dict[str, Any]) -> tuple[Array, Array, Array, Array] | No
         return None
     time_s, latitude, longitude, altitude = (np.asarray(c, dtype=np.float64)[valid] for c in columns)
     return time_s, latitude, longitude, altitude
+
+
+def _ground_m(topics: dict[str, Any], time_s: Array, start_m: float) -> Array:
+    """Home's altitude at each moment. PX4 sets home anew on the ground, after landing too, wherever its
+    estimate has drifted (HomePosition::update); until then heights counted from the home before."""
+    home = topics.get("home_position")
+    known = np.isfinite(home["alt"]) & (home["valid_alt"] > 0) if home is not None else np.array([], bool)
+    if home is None or not known.any():
+        return np.full(len(time_s), start_m)
+    before = np.searchsorted(home["timestamp"][known] / 1e6, time_s, side="right") - 1
+    return np.asarray(home["alt"][known], dtype=np.float64)[np.maximum(before, 0)]
 
 
 def _yaw_deg(topics: dict[str, Any], time_s: Array) -> Array:
