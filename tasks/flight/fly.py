@@ -82,8 +82,8 @@ class Flight:
             raise BadInput(
                 self.link.url,
                 "the vehicle that answers is no ArduCopter, and the mission is made for one",
-                "Connect an ArduCopter, or fly the exported mission with the vehicle's own ground station and"
-                " bring its log",
+                "Connect an ArduCopter, or fly the waypoints of mission.csv or mission.kml with the vehicle's"
+                " own ground station and bring its log (PX4 refuses mission.plan: it lacks CONDITION_YAW)",
             )
         if heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED:
             raise BadInput(

@@ -7,8 +7,11 @@ from contextlib import contextmanager
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from schemas.mission import mission_items
 from schemas.problem import BadInput
+from tasks.flight.fly import Flight
 from tasks.flight.link import Link, LinkLost
+from tests.flight.wall_plan import wall_plan
 
 
 def free_port() -> int:
@@ -49,6 +52,14 @@ def test_listens_to_the_first_autopilot_only_whatever_else_arrives() -> None:
         message = link.receive(2.0)
         assert message is not None
         assert message.get_srcSystem() == 1
+
+
+def test_another_autopilot_is_refused_and_what_it_can_fly_is_told() -> None:
+    plan = wall_plan(1, 1)
+    with udp_link() as (link, vehicle, address):
+        vehicle.sendto(heartbeat(1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4), address)
+        with pytest.raises(BadInput, match=r"no ArduCopter.*mission\.csv.*PX4 refuses mission\.plan"):
+            Flight(link, plan, mission_items(plan)).prepare()
 
 
 def test_a_vehicle_that_falls_silent_is_lost_though_others_talk() -> None:
