@@ -1,11 +1,10 @@
-"""The MAVLink side of the simulated vehicle: mission protocol, commands and telemetry as ArduCopter has them.
+"""The MAVLink side of the simulated vehicle: commands and telemetry as ArduCopter has them.
 
 On the ground it lives in real time. Once a mission starts its time is virtual: the whole flight is computed
 from mission and seed and told as fast as the link takes it, every message with the vehicle's own time.
 """
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -15,17 +14,15 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from schemas.contract import Vector3
 from schemas.geodesy import GeoOrigin, turned
-from schemas.mission import MissionItem
 from schemas.vehicle import Vehicle
-from tasks.simulation.trajectory import DO, NAVIGATION, STEP_S, Flown, fly_mission
+from tasks.simulation.mission_memory import MissionMemory
+from tasks.simulation.trajectory import STEP_S, Flown, fly_mission
 
 SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
 STABILIZE, AUTO, GUIDED = 0, 3, 4  # ArduCopter's modes
-CAPACITY = 700  # mission items
 BANNER = "ArduCopter simulated by Hairline"
 YAW_WRONG = "Arm: AHRS: EKF3 Yaw inconsistent 34 deg. Wait or reboot"
 TELEMETRY_S = 0.1
-UPLOAD_S = 8.0  # an upload is given up so long after its last item (MissionItemProtocol's upload_timeout_ms)
 BOOT_MS = 30_000  # vehicle's clock when it arms
 
 
@@ -64,9 +61,7 @@ class Autopilot:
         self.mav.robust_parsing = True
         self._send_bytes = send
         self._loss = np.random.default_rng([seed, 0x6C6F7373])
-        self.mission: list[MissionItem] = []
-        self.expected = self.received = 0  # items of the upload in progress; expected 0: none
-        self._heard_s = 0.0  # when the upload went on last
+        self.memory = MissionMemory(self.mav, self.send, origin, home_m, faults.lose_last_item)
         self.armed, self.mode = False, STABILIZE
         self._refused_modes = 0
 
@@ -76,7 +71,8 @@ class Autopilot:
         for message in self.mav.parse_buffer(data) or []:
             if message.get_type() == "BAD_DATA" or self._lost():
                 continue
-            handler = getattr(self, f"_on_{message.get_type().lower()}", None)
+            name = f"on_{message.get_type().lower()}"
+            handler = getattr(self.memory, name, None) or getattr(self, name, None)
             if handler is not None and getattr(message, "target_system", SYSTEM) == SYSTEM:
                 handler(message)
 
@@ -103,11 +99,7 @@ class Autopilot:
     def on_ground(self) -> None:
         """What it tells every second while it waits; it also asks again for a mission item, or gives up."""
         self.heartbeat()
-        if self.expected and time.monotonic() - self._heard_s > UPLOAD_S:
-            self.expected = 0
-            self._mission_ack(mavlink.MAV_MISSION_OPERATION_CANCELLED)
-        elif self.expected:
-            self._ask()
+        self.memory.go_on()
         self._stand()
 
     def _stand(self) -> None:
@@ -121,85 +113,9 @@ class Autopilot:
         for number, piece in enumerate(pieces):
             self.send(self.mav.statustext_encode(severity, piece, int(len(pieces) > 1), number))
 
-    # -- mission protocol ------------------------------------------------------------------------------
-
-    def _on_mission_count(self, message: Any) -> None:
-        if message.count > CAPACITY:
-            self._mission_ack(mavlink.MAV_MISSION_NO_SPACE)
-            return
-        del self.mission[message.count :]  # the others stay until they are replaced
-        self.expected, self.received, self._heard_s = message.count, 0, time.monotonic()
-        self._ask()
-
-    def _ask(self) -> None:
-        self.send(self.mav.mission_request_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, self.received))
-
-    def _on_mission_item_int(self, message: Any) -> None:
-        if not self.expected:
-            self._mission_ack(mavlink.MAV_MISSION_ERROR)
-        elif message.seq != self.received:
-            self._mission_ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
-        else:
-            refusal = _refusal(message)
-            if refusal is not None:
-                self.expected = 0  # what came so far stays
-                self._mission_ack(refusal)
-                return
-            self.mission[message.seq : message.seq + 1] = [_stored(message)]
-            self.received, self._heard_s = self.received + 1, time.monotonic()
-            if self.received < self.expected:
-                self._ask()
-            else:
-                self.expected = 0
-                if self.faults.lose_last_item:
-                    self.mission.pop()
-                self._mission_ack(mavlink.MAV_MISSION_ACCEPTED)
-
-    def _on_mission_clear_all(self, message: Any) -> None:
-        if self.expected:  # MissionItemProtocol::handle_mission_clear_all
-            self._mission_ack(mavlink.MAV_MISSION_ERROR)
-            return
-        self.mission.clear()
-        self._mission_ack(mavlink.MAV_MISSION_ACCEPTED)
-
-    def _on_mission_request_list(self, message: Any) -> None:
-        if self.expected:
-            self._mission_ack(mavlink.MAV_MISSION_DENIED)
-            return
-        self.send(self.mav.mission_count_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, len(self.mission)))
-
-    def _on_mission_request_int(self, message: Any) -> None:
-        if message.seq >= len(self.mission):
-            self._mission_ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
-            return
-        item = self.mission[message.seq]
-        x, y, z = item.x, item.y, item.z
-        if item.seq == 0:
-            latitude, longitude, z = self.origin.to_geographic(self.home_m)
-            x, y = round(latitude * 1e7), round(longitude * 1e7)
-        params = (item.param1, item.param2, item.param3, item.param4)
-        self.send(
-            self.mav.mission_item_int_encode(
-                255,
-                mavlink.MAV_COMP_ID_MISSIONPLANNER,
-                item.seq,
-                item.frame,
-                item.command,
-                0,
-                1,
-                *params,
-                x,
-                y,
-                z,
-            )
-        )
-
-    def _mission_ack(self, result: int) -> None:
-        self.send(self.mav.mission_ack_encode(255, mavlink.MAV_COMP_ID_MISSIONPLANNER, result))
-
     # -- commands --------------------------------------------------------------------------------------
 
-    def _on_command_long(self, message: Any) -> None:
+    def on_command_long(self, message: Any) -> None:
         accepted, denied = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
         result = accepted
         if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
@@ -207,7 +123,7 @@ class Autopilot:
         elif message.command == mavlink.MAV_CMD_DO_SET_MODE:
             result = self._change_mode(int(message.param2))
         elif message.command == mavlink.MAV_CMD_MISSION_START:
-            result = accepted if self.armed and len(self.mission) > 1 else denied
+            result = accepted if self.armed and len(self.memory.items) > 1 else denied
         elif message.command == mavlink.MAV_CMD_DO_SEND_BANNER:
             self._say(BANNER)
         elif message.command != mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
@@ -244,7 +160,7 @@ class Autopilot:
     # -- flight ----------------------------------------------------------------------------------------
 
     def _fly(self) -> None:
-        flown = fly_mission(tuple(self.mission), self.origin, self.home_m, self.vehicle, self.seed)
+        flown = fly_mission(tuple(self.memory.items), self.origin, self.home_m, self.vehicle, self.seed)
         for time_s, tell in sorted(self._events(flown), key=lambda event: event[0]):  # stable
             if self.faults.vanish_s is not None and time_s >= self.faults.vanish_s:
                 raise Vanished
@@ -280,7 +196,7 @@ class Autopilot:
     def _tell_reached(self, seq: int) -> Callable[[], None]:
         def tell() -> None:
             self.send(self.mav.mission_item_reached_encode(seq))
-            self.send(self.mav.mission_current_encode(min(seq + 1, len(self.mission) - 1)))
+            self.send(self.mav.mission_current_encode(min(seq + 1, len(self.memory.items) - 1)))
 
         return tell
 
@@ -336,41 +252,3 @@ class Autopilot:
     @staticmethod
     def _clock_ms(time_s: float) -> int:
         return BOOT_MS + round(time_s * 1000)
-
-
-def _refusal(message: Any) -> int | None:
-    """Why ArduPilot would not take this item."""
-    if message.command not in NAVIGATION + DO:
-        return int(mavlink.MAV_MISSION_UNSUPPORTED)
-    if message.command in NAVIGATION:
-        if message.frame not in (
-            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-        ):
-            return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
-        if abs(message.x) > 900_000_000:
-            return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    return None
-
-
-def _stored(message: Any) -> MissionItem:
-    """What ArduPilot keeps of an item: whole seconds of hold, centimetres, frame 3 or 0, no mount mode."""
-    navigates = message.command in NAVIGATION
-    mount = message.command == mavlink.MAV_CMD_DO_MOUNT_CONTROL
-    waypoint = message.command == mavlink.MAV_CMD_NAV_WAYPOINT
-    return MissionItem(
-        seq=message.seq,
-        frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT if navigates else mavlink.MAV_FRAME_GLOBAL,
-        command=message.command,
-        param1=float(int(message.param1)) if waypoint else _finite(message.param1),
-        param2=0.0 if waypoint else _finite(message.param2),
-        param3=_finite(message.param3),
-        param4=0.0 if waypoint else _finite(message.param4),
-        x=message.x,
-        y=message.y,
-        z=round(message.z, 2) if navigates else (0.0 if mount else message.z),
-    )
-
-
-def _finite(value: float) -> float:
-    return value if math.isfinite(value) else 0.0

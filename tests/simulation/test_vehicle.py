@@ -139,7 +139,6 @@ def test_does_not_start_without_arming_or_mission() -> None:
 def test_loss_drops_its_share_of_frames() -> None:
     station = Station(faults=Faults(loss=0.3))
     station.vehicle.armed = True
-    station.vehicle.mission = list(ITEMS)
     told = 0
     for _ in range(2000):
         station.heard.clear()
