@@ -155,8 +155,9 @@ def _not_shot(planned: FlightPlan, log: FlightLog) -> tuple[str, ...]:
 
 
 def _missed(log: FlightLog) -> tuple[LeftOut, ...]:
+    said = f"; the vehicle said: {'; '.join(log.said)}" if log.said else ""
     return tuple(
-        LeftOut(item=photo, stage="flight", what="planned but not shot", remedy="Fly a new mission id")
+        LeftOut(item=photo, stage="flight", what=f"planned but not shot{said}", remedy="Fly a new mission id")
         for photo in log.missed
     )
 

@@ -66,9 +66,9 @@ def fly(
     of = f"flight {flight} of {len(flights)}: " if len(flights) > 1 else ""
     say(f"{of}{len(log.shots)} photos in {log.duration_s / 60:.1f} min: {out / 'flight.mcap'}")
     if log.missed:
-        err.print(
-            f"[yellow]Warning: {len(log.missed)} planned photos were not shot, first {log.missed[0]}[/yellow]"
-        )
+        said = f"; the vehicle said: {'; '.join(log.said)}" if log.said else ""
+        text = f"Warning: {len(log.missed)} planned photos were not shot, first {log.missed[0]}{said}"
+        err.print("[yellow]" + text.replace("[", r"\[") + "[/yellow]")
 
 
 @app.command(name="convert-log")

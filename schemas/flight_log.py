@@ -39,6 +39,7 @@ class FlightLog(Contract):
     track: tuple[TrackPoint, ...]
     shots: tuple[Shot, ...]
     errors: tuple[TrackError, ...]
+    said: tuple[str, ...] = ()  # what the vehicle warned of in flight, each once
     missed: tuple[str, ...] = ()  # planned photos that the log has no shot of
     later_archives: tuple[File, ...] = ()  # of the plan's second and further flights
 
@@ -71,6 +72,7 @@ def joined(logs: Sequence[FlightLog]) -> FlightLog:
             for number, log in enumerate(logs, start=1)
             for error in log.errors
         ),
+        said=tuple(dict.fromkeys(text for log in logs for text in log.said)),
         missed=tuple(dict.fromkeys(photo for log in logs for photo in log.missed if photo not in shots)),
         later_archives=archives[1:],
     )

@@ -58,7 +58,6 @@ class Flight:
         # Around the climb from home the plan keeps everything away by the vehicle's radius, its position
         # error and the clearance: a vehicle no farther off than the clearance meets nothing.
         self.off_home_m = max(plan.vehicle.clearance_m, LEAST_OFF_M)
-        self.warnings: list[str] = []  # what the vehicle said is wrong
         self._recorder: Recorder | None = None
         self._next_recorder: Recorder | None = None
         link.on_message = self._on_message
@@ -158,7 +157,7 @@ class Flight:
         """Into GUIDED, in which it arms without a radio's throttle, and armed. Just after power-up both are
         refused until the filters have settled."""
         until = time.monotonic() + 2 * self.link.timeout_s
-        self.warnings.clear()
+        self.reader.recording.said.clear()
         self._next_recorder = recorder
         while True:
             refusal = "the vehicle does not change to GUIDED"
@@ -221,7 +220,7 @@ class Flight:
         abandon_mission(self.link)
 
     def _problem(self, what: str) -> BadInput:
-        said = "; ".join(dict.fromkeys(text.strip() for text in self.warnings[-5:]))
+        said = "; ".join(dict.fromkeys(text.strip() for _, text in self.reader.recording.said[-5:]))
         return BadInput(
             self.link.url,
             f"{what}; it says: {said}" if said else what,
@@ -232,14 +231,10 @@ class Flight:
 
     def _on_message(self, message: Any) -> None:
         kind = message.get_type()
-        if kind == "STATUSTEXT" and message.severity <= mavlink.MAV_SEVERITY_WARNING:
-            if message.chunk_seq and self.warnings:  # more than 50 characters come in pieces
-                self.warnings[-1] += message.text
-            else:
-                self.warnings.append(message.text)
-        elif kind == "COMMAND_ACK" and self._recorder is None and _armed(message):
+        if kind == "COMMAND_ACK" and self._recorder is None and _armed(message):
             self._recorder = self._next_recorder
             self.reader.recording.fixes.clear()
+            self.reader.recording.said.clear()
         read = self.reader.read(message, time.monotonic())
         if self._recorder is not None:
             time_ns = round(self.reader.clock_s * 1000) * 1_000_000

@@ -61,9 +61,7 @@ class MessageReader:
         elif kind == "MISSION_CURRENT":
             self.mission_item = message.seq
         elif kind == "STATUSTEXT":
-            name = vehicle_name(message.text)
-            if name is not None and vehicle_name(self.recording.vehicle) is None:
-                self.recording.vehicle = name
+            self._on_text(message)
         return None
 
     def close(self) -> Recording:
@@ -109,6 +107,18 @@ class MessageReader:
         self.armed = armed
         if self.recording.vehicle == Recording.vehicle:
             self.recording.vehicle = _kind_of_vehicle(message)
+
+    def _on_text(self, message: Any) -> None:
+        name = vehicle_name(message.text)
+        if name is not None and vehicle_name(self.recording.vehicle) is None:
+            self.recording.vehicle = name
+        if message.severity > mavlink.MAV_SEVERITY_WARNING:
+            return
+        said = self.recording.said
+        if message.chunk_seq and said:  # more than 50 characters come in pieces
+            said[-1] = (said[-1][0], said[-1][1] + message.text)
+        else:
+            said.append((self.clock_s, message.text))
 
     def _end_of_flight(self) -> None:
         if self.recording.armed_s:

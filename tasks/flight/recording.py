@@ -34,6 +34,7 @@ class Recording:
     fixes: list[Fix] = field(default_factory=list)
     triggers: list[Trigger] = field(default_factory=list)
     armed_s: list[tuple[float, float]] = field(default_factory=list)  # when the motors ran
+    said: list[tuple[float, str]] = field(default_factory=list)  # when the vehicle warned, and of what
 
     def add(self, fix: Fix) -> bool:
         """Keep a fix unless it is closer than TRACK_S to the last one; says whether it was kept."""

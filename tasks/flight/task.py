@@ -52,6 +52,7 @@ def flight_pages(inputs: Mapping[str, Any], log: FlightLog) -> Sequence[Page]:
     ]
     summary = (
         f"**{log.vehicle}**, {log.duration_s / 60:.1f} min, {len(log.shots)} shots, {len(log.missed)} missed"
+        + "".join(f"\n- the vehicle said: {text}" for text in log.said)
         + "".join(f"\n- not shot: {photo}" for photo in log.missed)
     )
     return [
@@ -158,6 +159,7 @@ def _flight_log(recording: "Recording", archive: File, plan: FlightPlan | None, 
                 shots=found.shots,
                 errors=found.errors,
                 missed=found.missed,
+                said=found.said,
             )
             for found in compare_with_flights(recording, plan, name)
         ]

@@ -28,6 +28,7 @@ class Comparison:
     errors: tuple[TrackError, ...]
     missed: tuple[str, ...]
     duration_s: float
+    said: tuple[str, ...] = ()  # what the vehicle warned of, each once
 
 
 def compare_with_plan(recording: Recording, plan: FlightPlan | None, name: str) -> Comparison:
@@ -48,9 +49,10 @@ def compare_with_plan(recording: Recording, plan: FlightPlan | None, name: str) 
     )
     duration = round(max(end - start, float(time_s[-1])), 3)
     triggers = [t for t in recording.triggers if _in_flight(t.fix.time_s, recording)]
+    said = tuple(dict.fromkeys(text.strip() for t, text in recording.said if _in_flight(t, recording)))
     if plan is None:
         shots = with_velocity(unnamed_shots(triggers, start, place), time_s, at_m)
-        return Comparison(track, shots, (), (), duration)
+        return Comparison(track, shots, (), (), duration, said)
     away_m = float(np.linalg.norm(at_m - plan.home_m, axis=1).min())
     if away_m > ELSEWHERE_M:
         raise BadInput(
@@ -65,7 +67,7 @@ def compare_with_plan(recording: Recording, plan: FlightPlan | None, name: str) 
     leg = legs_of(at_m, corners, *legs_between(time_s, left_s, last=len(corners) - 2))
     shots, missed = planned_shots(plan, triggers, known, track, leg, start, place)
     errors = _errors(plan, at_m, corners, leg)
-    return Comparison(track, with_velocity(shots, time_s, at_m), errors, missed, duration)
+    return Comparison(track, with_velocity(shots, time_s, at_m), errors, missed, duration, said)
 
 
 def with_velocity(shots: Sequence[Shot], time_s: Array, at_m: Array) -> tuple[Shot, ...]:

@@ -19,7 +19,7 @@ from tasks.simulation.mission_memory import MissionMemory
 from tasks.simulation.trajectory import STEP_S, Flown, fly_mission
 
 SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
-STABILIZE, AUTO, GUIDED = 0, 3, 4  # ArduCopter's modes
+STABILIZE, AUTO, GUIDED, RTL = 0, 3, 4, 6  # ArduCopter's modes
 BANNER = "ArduCopter simulated by Hairline"
 YAW_WRONG = "Arm: AHRS: EKF3 Yaw inconsistent 34 deg. Wait or reboot"
 TELEMETRY_S = 0.1
@@ -37,6 +37,7 @@ class Faults:
     lose_last_item: bool = False  # of an uploaded mission
     home_off_m: float = 0.0  # its own home, from which it counts heights, lies as far above the ground
     drift_m: float = 0.0  # as far north of where it stood does it stand after arming
+    failsafe_s: float | None = None  # the battery is low at this time of the flight: it goes home
     vanish_s: float | None = None  # the link ends at this time of the flight
 
 
@@ -164,6 +165,11 @@ class Autopilot:
         for time_s, tell in sorted(self._events(flown), key=lambda event: event[0]):  # stable
             if self.faults.vanish_s is not None and time_s >= self.faults.vanish_s:
                 raise Vanished
+            if self.faults.failsafe_s is not None and time_s >= self.faults.failsafe_s:
+                self.mode = RTL  # whose way home is not told
+                self._say("Battery 1 is low 13.20V used 2500 mAh", mavlink.MAV_SEVERITY_WARNING)
+                self.heartbeat()
+                break
             tell()
         self.armed = False
         self.heartbeat()

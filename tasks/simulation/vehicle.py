@@ -44,8 +44,9 @@ def start_vehicle(plan: FlightPlan, seed: int, faults: Faults | None = None) -> 
     command += ["--settling", str(faults.settling), "--home-off-m", str(faults.home_off_m)]
     command += ["--drift-m", str(faults.drift_m)]
     command += [f"--{name.replace('_', '-')}" for name in _SWITCHES if getattr(faults, name)]
-    if faults.vanish_s is not None:
-        command += ["--vanish-s", str(faults.vanish_s)]
+    for moment in ("vanish_s", "failsafe_s"):
+        if (at_s := getattr(faults, moment)) is not None:
+            command += [f"--{moment.replace('_', '-')}", str(at_s)]
     root = str(Path(__file__).parents[2])
     path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     process = subprocess.Popen(
@@ -83,6 +84,7 @@ def main() -> None:
     where.add_argument("--airframe", help="JSON with vehicle, origin, home_m")
     parser.add_argument("--loss", type=float, default=0.0, help="share of frames lost in either direction")
     parser.add_argument("--vanish-s", type=float, help="end the link at this time of the flight")
+    parser.add_argument("--failsafe-s", type=float, help="the battery is low at this time of the flight")
     parser.add_argument("--settling", type=int, default=0, help="refuse as many changes of mode")
     parser.add_argument("--home-off-m", type=float, default=0.0, help="heights count from above the ground")
     parser.add_argument("--drift-m", type=float, default=0.0, help="it stands farther north after arming")
@@ -102,6 +104,7 @@ def main() -> None:
         lose_last_item=options.lose_last_item,
         home_off_m=options.home_off_m,
         drift_m=options.drift_m,
+        failsafe_s=options.failsafe_s,
         vanish_s=options.vanish_s,
     )
     with socket.create_server(("127.0.0.1", options.port)) as server:

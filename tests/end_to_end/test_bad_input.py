@@ -56,6 +56,17 @@ def test_what_was_received_of_a_flight_outlives_the_command(tmp_path: Path) -> N
     assert next(messages(tmp_path / "out" / "flight.mcap"))[0]
 
 
+def test_photos_that_a_failsafe_left_out_are_told_with_what_the_vehicle_said(tmp_path: Path) -> None:
+    plan = wall_plan(4, 2)
+    (tmp_path / "plan.json").write_text(plan.model_dump_json())
+    with start_vehicle(plan, 3, Faults(failsafe_s=20.0)) as url:
+        words = ("fly", "plan.json", "--connection", url, "--out", "out")
+        result = hairline(*words, cwd=tmp_path, timeout_s=120)
+    said = " ".join(result.stderr.split())
+    assert "planned photos were not shot" in said
+    assert "the vehicle said: Battery 1 is low" in said
+
+
 def test_an_unknown_key_is_told_before_anything_starts(tmp_path: Path) -> None:
     path = write_inspection(tmp_path / "site", photos=1)
     path.write_text(path.read_text() + "detects: {}\n")

@@ -21,7 +21,7 @@ from schemas.problem import BadInput
 from tasks.flight.fly import Flight
 from tasks.flight.link import Link
 from tasks.flight.recording import archive
-from tasks.flight.task import FlightCutShort, convert, fly, import_log
+from tasks.flight.task import FlightCutShort, convert, flight_pages, fly, import_log
 from tasks.flight.upload import read_back
 from tasks.simulation.autopilot import Faults
 from tasks.simulation.trajectory import fly_mission
@@ -133,6 +133,16 @@ def test_an_interrupted_flight_keeps_what_was_archived_and_says_that_the_vehicle
     assert part.shots
     assert part.missed
     assert str(pickle.loads(pickle.dumps(problem.value))) == str(problem.value)
+
+
+def test_what_the_vehicle_warned_of_stands_beside_the_photos_that_lack() -> None:
+    with start_vehicle(PLAN, 3, Faults(failsafe_s=30.0)) as url:
+        cut = fly.bare(PLAN, "1", url, 5.0)
+    assert cut.shots
+    assert cut.missed
+    assert cut.said == ("Battery 1 is low 13.20V used 2500 mAh",)
+    assert import_log.bare(cut.archive, "flight.mcap", PLAN) == cut
+    assert "the vehicle said: Battery 1 is low" in (flight_pages({}, cut)[0].markdown or "")
 
 
 def test_a_dashboard_that_hangs_or_fails_does_not_keep_the_flight_waiting(
