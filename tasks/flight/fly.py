@@ -73,6 +73,8 @@ class Flight:
         for message, rate_hz in RATES_HZ.items():
             self.link.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, 1e6 / rate_hz, attempts=4)
         self._check_place()
+        if heartbeat.custom_mode == AUTO:  # where it stays after a flight, and no mission can be cleared
+            self._set_mode(GUIDED)
         upload_mission(self.link, self.items)
         return self.reader.recording.vehicle
 
@@ -212,9 +214,10 @@ class Flight:
                 return
 
     def _stand_down(self) -> None:
-        """On the ground, after a failure: motors off, no mission left behind."""
+        """On the ground, after a failure: motors off, no mission left. In the air neither is obeyed."""
         try:
-            self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, attempts=3)
+            if self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, attempts=3) == ACCEPTED:
+                self._set_mode(GUIDED)  # in AUTO no mission can be cleared
         except LinkLost:
             return
         abandon_mission(self.link)

@@ -133,7 +133,7 @@ class Autopilot:
         if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and self.armed:
             self._stand()
         if message.command == mavlink.MAV_CMD_MISSION_START and result == accepted:
-            self.mode = AUTO
+            self._enter(AUTO)
             self._fly()
 
     def _change_mode(self, mode: int) -> int:
@@ -141,8 +141,12 @@ class Autopilot:
             self._refused_modes += 1
             self._say("Mode change to GUIDED failed: requires position", mavlink.MAV_SEVERITY_WARNING)
             return int(mavlink.MAV_RESULT_FAILED)
-        self.mode = mode
+        self._enter(mode)
         return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _enter(self, mode: int) -> None:
+        """In AUTO the mission runs, on the ground too, and after its end until the mode is left."""
+        self.mode, self.memory.running = mode, mode == AUTO
 
     def _arm(self) -> int:
         if self.faults.refuse_arm:
@@ -166,7 +170,7 @@ class Autopilot:
             if self.faults.vanish_s is not None and time_s >= self.faults.vanish_s:
                 raise Vanished
             if self.faults.failsafe_s is not None and time_s >= self.faults.failsafe_s:
-                self.mode = RTL  # whose way home is not told
+                self._enter(RTL)  # whose way home is not told
                 self._say("Battery 1 is low 13.20V used 2500 mAh", mavlink.MAV_SEVERITY_WARNING)
                 self.heartbeat()
                 break

@@ -36,6 +36,7 @@ class MissionMemory:
         self.items: list[MissionItem] = []
         self.expected = self.received = 0  # items of the upload in progress; expected 0: none
         self._heard_s = 0.0  # when the upload went on last
+        self.running = False  # the mission, and then it is not cleared
 
     def go_on(self) -> None:
         """Ask again for a mission item, or give up."""
@@ -78,7 +79,7 @@ class MissionMemory:
                 self._ack(mavlink.MAV_MISSION_ACCEPTED)
 
     def on_mission_clear_all(self, message: Any) -> None:
-        if self.expected:  # MissionItemProtocol::handle_mission_clear_all
+        if self.expected or self.running:  # handle_mission_clear_all; AP_Mission::clear
             self._ack(mavlink.MAV_MISSION_ERROR)
             return
         self.items.clear()

@@ -18,11 +18,11 @@ from schemas.flight_log import FlightLog
 from schemas.flight_plan import FlightPlan
 from schemas.mission import mission_items
 from schemas.problem import BadInput
-from tasks.flight.fly import Flight
+from tasks.flight.fly import AUTO, Flight
 from tasks.flight.link import Link
 from tasks.flight.recording import archive
 from tasks.flight.task import FlightCutShort, convert, flight_pages, fly, import_log
-from tasks.flight.upload import read_back
+from tasks.flight.upload import clear_mission, read_back
 from tasks.simulation.autopilot import Faults
 from tasks.simulation.trajectory import fly_mission
 from tasks.simulation.vehicle import start_vehicle
@@ -62,6 +62,26 @@ def test_flies_what_was_planned(log: FlightLog) -> None:
 
 def test_the_same_flight_has_the_same_archive(log: FlightLog, vehicle: str) -> None:
     assert fly.bare(PLAN, "2", vehicle, 10.0) == log
+
+
+def test_a_vehicle_that_has_flown_takes_the_next_mission_at_once(log: FlightLog, vehicle: str) -> None:
+    """ArduCopter stays in AUTO when it has landed, and refuses to clear a mission there."""
+    with Link(vehicle, 5.0) as link:
+        assert link.find_vehicle().custom_mode == AUTO
+        assert not clear_mission(link)
+        Flight(link, PLAN, mission_items(PLAN)).prepare()
+        assert clear_mission(link)
+
+
+def test_a_vehicle_that_refuses_to_start_keeps_no_mission(
+    vehicle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mavlink, "MAV_CMD_MISSION_START", 4242)
+    with pytest.raises(BadInput, match=r"does not start the mission|did not take off"):
+        fly.bare(PLAN, "1", vehicle, 5.0)
+    with Link(vehicle, 5.0) as link:
+        link.find_vehicle()
+        assert read_back(link) == ()
 
 
 def test_the_archive_gives_the_flight_back(log: FlightLog) -> None:
