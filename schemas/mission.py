@@ -15,6 +15,7 @@ GIMBAL_RATE_DEG_S = 30.0  # slow end of what drone gimbals do
 # The shortest hold that ArduPilot keeps. Without any ArduCopter does not stop at a waypoint but rounds the
 # corner (ModeAuto::set_next_wp, SCurve), up to WPNAV_RADIUS off the planned path: 2 m as delivered.
 STOP_S = 1.0
+LEAST_M = 0.01  # a height of 0 is none to ArduCopter, which then keeps its own (ModeAuto::loc_from_cmd)
 
 
 class MissionItem(Contract):
@@ -63,6 +64,8 @@ def mission_items(plan: FlightPlan) -> tuple[MissionItem, ...]:
             latitude, longitude, _ = plan.origin.to_geographic(position)
             x, y = round(latitude * 1e7), round(longitude * 1e7)
             z = round(position[2] - plan.home_m[2], 2)  # ArduPilot keeps centimetres
+            if command == mavlink.MAV_CMD_NAV_WAYPOINT and items and z == 0.0:
+                z = LEAST_M
             frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         items.append(
             MissionItem(seq=len(items), frame=frame, command=command, x=x, y=y, z=z, photo=photo, **params)

@@ -170,7 +170,10 @@ def _target(item: MissionItem, position: Array, origin: GeoOrigin, home_m: Vecto
     if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:  # ArduCopter climbs straight up, whatever it is told
         east, north = position[0], position[1]
     height = 0.0 if item.command == mavlink.MAV_CMD_NAV_LAND else _single(item.z)
-    return np.array([east, north, home_m[2] + height])
+    up = home_m[2] + height
+    if item.command == mavlink.MAV_CMD_NAV_WAYPOINT and height == 0.0:  # no height given: its own
+        up = position[2]
+    return np.array([east, north, up])
 
 
 def _ramp_steps(distance_m: float, speed_m_s: float, acceleration_m_s2: float) -> int:

@@ -135,6 +135,18 @@ def test_a_mission_without_yaw_commands_looks_along_its_path() -> None:
     assert [round(s.true_pose.yaw_deg / 90) % 4 for s in f.shots[1:3]] == [1, 1]  # east, not north
 
 
+def test_photos_at_the_height_of_home_are_taken_there() -> None:
+    """From a deck, say. ArduCopter takes a height of 0 for none and stays as high as it is."""
+    plan = wall_plan(vehicle=exact())
+    at_home = tuple(
+        w.model_copy(update={"position_m": (*w.position_m[:2], plan.home_m[2])}) if w.photo else w
+        for w in plan.waypoints
+    )
+    plan = plan.model_copy(update={"waypoints": at_home})
+    for shot in flown(plan).shots:
+        assert shot.estimated_pose.position_m[2] == pytest.approx(plan.home_m[2], abs=0.1)
+
+
 def test_a_change_of_pitch_alone_does_not_turn_the_nose() -> None:
     """Up to 4.5 ArduCopter takes the yaw of DO_MOUNT_CONTROL, 0, for a heading if the gimbal does not pan."""
     plan = wall_plan(2, 1, exact())
