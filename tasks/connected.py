@@ -37,7 +37,7 @@ class Marked(NamedTuple):
     @classmethod
     def gathered(cls, height_px: int, width_px: int, parts: Iterable[Part]) -> "Marked":
         """Of parts that overlap nowhere."""
-        nothing = above_0(np.zeros((1, 1), dtype=np.uint8), 0, 0)
+        nothing = at_least(1, np.zeros((1, 1), dtype=np.uint8), 0, 0)
         y, x, level = (np.concatenate(column) for column in zip(nothing, *parts, strict=True))
         order = np.lexsort((x, y))
         return cls(height_px, width_px, y[order], x[order], level[order])
@@ -46,12 +46,12 @@ class Marked(NamedTuple):
     def of_levels(cls, levels: npt.NDArray[np.uint8]) -> "Marked":
         """What is not 0 in (H, W)."""
         height_px, width_px = levels.shape
-        return cls.gathered(height_px, width_px, [above_0(levels, 0, 0)])
+        return cls.gathered(height_px, width_px, [at_least(1, levels, 0, 0)])
 
     @classmethod
     def of(cls, mask: BitMask) -> "Marked":
         """Level 1 where the mask is set."""
-        parts = (above_0(band.view(np.uint8), top, 0) for top, band in mask.bands())
+        parts = (at_least(1, band.view(np.uint8), top, 0) for top, band in mask.bands())
         return cls.gathered(mask.height_px, mask.width_px, parts)
 
     def where(self, chosen: npt.NDArray[np.bool_]) -> "Marked":
@@ -63,9 +63,9 @@ class Marked(NamedTuple):
         return BitMask.at_pixels(self.height_px, self.width_px, self.y, self.x)
 
 
-def above_0(levels: npt.NDArray[np.uint8], top: int, left: int) -> Part:
-    """What is not 0 in a window of an image that begins at row `top` and column `left`."""
-    y, x = np.nonzero(levels)
+def at_least(least: int, levels: npt.NDArray[np.uint8], top: int, left: int) -> Part:
+    """The pixels of at least that level in a window that begins at row `top` and column `left`."""
+    y, x = np.nonzero(levels >= least)
     return Part(y.astype(np.int32) + np.int32(top), x.astype(np.int32) + np.int32(left), levels[y, x])
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.bit_mask import BitMask
-from tasks.connected import Marked, above_0, connected, regions
+from tasks.connected import Marked, at_least, connected, regions
 
 
 def blotches(seed: int, height: int = 1400, width: int = 90) -> np.ndarray:
@@ -54,7 +54,9 @@ def test_nothing_set_has_no_components() -> None:
 
 def test_levels_stay_with_their_pixels_whatever_the_order_of_the_windows() -> None:
     levels = np.random.default_rng(1).integers(0, 3, (20, 30)).astype(np.uint8)
-    parts = [above_0(levels[a : a + 7, b : b + 11], a, b) for b in range(0, 30, 11) for a in range(0, 20, 7)]
+    parts = [
+        at_least(1, levels[a : a + 7, b : b + 11], a, b) for b in range(0, 30, 11) for a in range(0, 20, 7)
+    ]
     assert all(
         (one == other).all()
         for one, other in zip(Marked.gathered(20, 30, parts)[2:], Marked.of_levels(levels)[2:], strict=True)

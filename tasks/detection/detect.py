@@ -9,7 +9,7 @@ from schemas.bit_mask import BitMask
 from schemas.detection import Peaks
 from schemas.raster import ArrayRaster, Pixels, Progress, Raster
 from schemas.settings import DetectSettings
-from tasks.connected import Marked, Part, above_0
+from tasks.connected import Marked, Part, at_least
 from tasks.detection.bands import by_bands
 from tasks.detection.candidates import Scored, candidates
 from tasks.detection.components import long_and_thin
@@ -83,7 +83,7 @@ def _by_network(
 ) -> DetectionArrays:
     """What a network holds for cracks, long and likely enough as a whole, less what is straight."""
     parts = (
-        above_0(np.where(p >= model.limits.edge, p, np.uint8(0)), window.top, window.left)
+        at_least(model.limits.edge, p, window.top, window.left)
         for window, p in probabilities(raster, model, on_progress)
     )
     pixels = Marked.gathered(raster.height_px, raster.width_px, parts)
@@ -112,7 +112,7 @@ def _ridge(
         grey = grey_of(raster.rgb(top, bottom, 0, raster.width_px))
         valid = raster.valid(top, bottom, 0, raster.width_px)
         levels = dark_levels(grey, valid, scale, settings.k, settings.R)
-        return above_0(levels[y0 - top : y1 - top], y0, 0)
+        return at_least(1, levels[y0 - top : y1 - top], y0, 0)
 
     parts = by_bands(raster.height_px, scale.halo, band, on_progress)
     dark = Marked.gathered(raster.height_px, raster.width_px, parts)
