@@ -72,7 +72,9 @@ def fates(
                 result.append(Fate("rejected", reason))
             else:
                 sigma = float(prior.sigma_position[:2].max())
-                reason = f"by its stated position alone (± {sigma:.2f} m): too little texture to match"
+                textured = _strong(features[i]) >= TEXTURED
+                why = "no match with another photo holds it" if textured else "too little texture to match"
+                reason = f"by its stated position alone (± {sigma:.2f} m): {why}"
                 result.append(Fate("placed", reason, view))
     return result
 
