@@ -110,6 +110,8 @@ def test_masked_pixels_have_no_say() -> None:
 def test_bands_give_what_the_whole_gives(settings: DetectSettings, monkeypatch: pytest.MonkeyPatch) -> None:
     rgb = rough(420, 300, contrast=0.08)
     with_crack(rgb, 200, 4, 0.7, 10, 290)
+    cv2.circle(rgb, (240, 128), 14, (45, 45, 45), cv2.FILLED)  # compact, on the border of two bands
+    cv2.rectangle(rgb, (60, 290), (210, 390), (45, 45, 45), cv2.FILLED)  # shade, larger than the window
     valid = np.ones(rgb.shape[:2], dtype=bool)
     valid[:, :30], valid[180:230, 120:150] = False, False
     peaks = Peaks(peaks=(60, 150), i_surface=150)
