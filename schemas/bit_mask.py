@@ -22,7 +22,7 @@ class BitMask:
     def of(cls, mask: npt.NDArray[np.bool_]) -> Self:
         """Of an (H, W) array."""
         made = cls(*mask.shape)
-        made.write(0, mask)
+        made.write(0, 0, mask)
         return made
 
     @classmethod
@@ -40,9 +40,12 @@ class BitMask:
         y, x = y[inside], x[inside]
         np.bitwise_or.at(self.rows, (y, x >> 3), np.uint8(128) >> (x & 7).astype(np.uint8))
 
-    def write(self, top: int, band: npt.NDArray[np.bool_]) -> None:
-        """Whole rows, (n, W), from row `top` on. Other rows may be written at the same time."""
-        self.rows[top : top + len(band)] = np.packbits(band, axis=1)
+    def write(self, top: int, left: int, part: npt.NDArray[np.bool_]) -> None:
+        """(h, w) from row `top` and column `left` on. It begins at a multiple of 8 columns and ends at one or
+        with the image: so parts that overlap nowhere may be written at the same time."""
+        height, width = part.shape
+        assert left % 8 == 0 and (width % 8 == 0 or left + width == self.width_px)
+        self.rows[top : top + height, left // 8 : -(-(left + width) // 8)] = np.packbits(part, axis=1)
 
     def read(self, y0: int, y1: int, x0: int, x1: int) -> npt.NDArray[np.bool_]:
         """(y1 − y0, x1 − x0) of rows y0..y1 and columns x0..x1."""

@@ -10,7 +10,6 @@ from schemas.detection import Peaks
 from schemas.raster import ArrayRaster, Pixels, Progress, Raster
 from schemas.settings import DetectSettings
 from tasks.connected import Marked, Part, at_least
-from tasks.detection.bands import by_bands
 from tasks.detection.candidates import Scored, candidates
 from tasks.detection.components import long_and_thin
 from tasks.detection.edges import without_soft
@@ -20,6 +19,7 @@ from tasks.detection.network import Model, our_model, probabilities
 from tasks.detection.paper import paper_mask
 from tasks.detection.ridge import SEED, Scale, dark_levels
 from tasks.detection.sauvola import Mask, grey_of
+from tasks.detection.windows import Window, by_windows
 
 WINDOW_PX = 63  # N: best on our development photos (METHOD); holds cracks of up to half of it, 31 px
 WORTH_SAYING = 0.1  # a rejected candidate with a lower score is not worth a line
@@ -108,13 +108,11 @@ def _ridge(
     least_px: float,
     on_progress: Progress | None,
 ) -> DetectionArrays:
-    def band(y0: int, y1: int, top: int, bottom: int) -> Part:
-        grey = grey_of(raster.rgb(top, bottom, 0, raster.width_px))
-        valid = raster.valid(top, bottom, 0, raster.width_px)
-        levels = dark_levels(grey, valid, scale, settings.k, settings.R)
-        return at_least(1, levels[y0 - top : y1 - top], y0, 0)
+    def dark_in(window: Window, seen: Window) -> Part:
+        levels = dark_levels(grey_of(raster.rgb(*seen)), raster.valid(*seen), scale, settings.k, settings.R)
+        return at_least(1, levels[window.inside(seen)], window.top, window.left)
 
-    parts = by_bands(raster.height_px, scale.halo, band, on_progress)
+    parts = by_windows(raster, scale.halo, dark_in, on_progress)
     dark = Marked.gathered(raster.height_px, raster.width_px, parts)
     kept, stains = without_soft(long_and_thin(dark, SEED, least_px), raster, dark.mask)
     kept, joints = without_joints(kept, JOINT_LENGTHS * least_px, least_px)
@@ -134,27 +132,23 @@ def global_mask(raster: Raster, threshold: float) -> BitMask:
     """Valid pixels whose grey level lies below one threshold for the whole image."""
     mask = BitMask(raster.height_px, raster.width_px)
 
-    def band(y0: int, y1: int, _top: int, _bottom: int) -> None:
-        grey = grey_of(raster.rgb(y0, y1, 0, raster.width_px))
-        mask.write(y0, darker_than(grey, raster.valid(y0, y1, 0, raster.width_px), threshold))
+    def fill(window: Window, _: Window) -> None:
+        dark = darker_than(grey_of(raster.rgb(*window)), raster.valid(*window), threshold)
+        mask.write(window.top, window.left, dark)
 
-    by_bands(raster.height_px, 0, band)
+    by_windows(raster, 0, fill)
     return mask
 
 
 def red_histogram(raster: Raster) -> Histogram:
     """(256,) valid pixels of each red level."""
 
-    def band(y0: int, y1: int, _top: int, _bottom: int) -> npt.NDArray[np.int64]:
-        red = raster.rgb(y0, y1, 0, raster.width_px)[..., 0]
-        return np.bincount(red[raster.valid(y0, y1, 0, raster.width_px)], minlength=256)
+    def levels(window: Window, _: Window) -> npt.NDArray[np.int64]:
+        return np.bincount(raster.rgb(*window)[..., 0][raster.valid(*window)], minlength=256)
 
-    histogram: Histogram = np.sum(by_bands(raster.height_px, 0, band), axis=0)
+    histogram: Histogram = np.sum(by_windows(raster, 0, levels), axis=0)
     return histogram
 
 
 def count_valid(raster: Raster) -> int:
-    def band(y0: int, y1: int, _top: int, _bottom: int) -> int:
-        return int(raster.valid(y0, y1, 0, raster.width_px).sum())
-
-    return sum(by_bands(raster.height_px, 0, band))
+    return sum(by_windows(raster, 0, lambda window, _: int(raster.valid(*window).sum())))

@@ -9,10 +9,10 @@ import numpy.typing as npt
 from schemas.bit_mask import BitMask
 from schemas.detection import Peaks
 from schemas.raster import Progress, Raster
-from tasks.detection.bands import by_bands
 from tasks.detection.global_threshold import darker_peak
 from tasks.detection.line_like import compact_objects
 from tasks.detection.sauvola import Mask, grey_of, sauvola
+from tasks.detection.windows import Window, by_windows
 
 BETA = 255  # paper, eq. 4
 
@@ -25,18 +25,17 @@ def paper_mask(
     darker = darker_peak(peaks)
     surface = None if darker is None else peaks.i_surface
 
-    def band(y0: int, y1: int, top: int, bottom: int) -> None:
-        rgb = raster.rgb(top, bottom, 0, raster.width_px)
-        valid = raster.valid(top, bottom, 0, raster.width_px)
+    def fill(window: Window, seen: Window) -> None:
+        rgb, valid = raster.rgb(*seen), raster.valid(*seen)
         grey, red = grey_of(rgb), rgb[..., 0]
         if darker is not None and surface is not None:
             dark = (red < (darker + surface) / 2) & valid
             grey[compact_objects(dark, window_px)] = surface
         grey[~valid | outside(red, peaks.t1, peaks.t2)] = BETA
-        mask.write(y0, sauvola(grey, window_px, k, R)[y0 - top : y1 - top])
+        mask.write(window.top, window.left, sauvola(grey, window_px, k, R)[window.inside(seen)])
 
     # as far as Sauvola's window, and an object that is smaller than it lies within as much again
-    by_bands(raster.height_px, 2 * window_px, band, on_progress)
+    by_windows(raster, 2 * window_px, fill, on_progress)
     return mask
 
 

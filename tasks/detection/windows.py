@@ -1,10 +1,18 @@
-"""An image of any size, cut into windows that a network sees one by one, each with a halo around it."""
+"""An image of any size, cut into windows that are worked on one by one, each with a halo around it: the
+result is that of the whole image at once."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-from schemas.raster import Raster
+from schemas.raster import Progress, Raster
+
+MOST_PX = 3 << 20  # of a window and its halo, where by_windows cuts
+STEP_PX = 64  # whose windows begin at multiples of it
+WORKERS = 2  # windows at a time: bounds the memory
+
+T = TypeVar("T")
 
 
 class Window(NamedTuple):
@@ -23,6 +31,11 @@ class Window(NamedTuple):
             min(within.right, self.right + halo_px),
         )
 
+    def inside(self, wider: "Window") -> tuple[slice, slice]:
+        """Where it lies in an array of a wider window."""
+        top, left = wider.top, wider.left
+        return slice(self.top - top, self.bottom - top), slice(self.left - left, self.right - left)
+
     @property
     def area_px(self) -> int:
         return (self.bottom - self.top) * (self.right - self.left)
@@ -30,6 +43,24 @@ class Window(NamedTuple):
 
 def whole_of(raster: Raster) -> Window:
     return Window(0, raster.height_px, 0, raster.width_px)
+
+
+def by_windows(
+    raster: Raster, halo_px: int, work: Callable[[Window, Window], T], on_progress: Progress | None = None
+) -> list[T]:
+    """`work(window, seen)` for each window, which may look at what is `seen` around it.
+
+    OpenCV and numpy free the interpreter, so that windows run at the same time; results come in order."""
+    image = whole_of(raster)
+    most_px = max(MOST_PX, 2 * (STEP_PX + 2 * halo_px) ** 2)
+    parts = list(windows(image, image, halo_px, most_px, STEP_PX))
+    results: list[T] = []
+    with ThreadPoolExecutor(WORKERS) as pool:
+        for done in pool.map(lambda part: work(part, part.grown(halo_px, image)), parts):
+            results.append(done)
+            if on_progress is not None:
+                on_progress(len(results) / len(parts))
+    return results
 
 
 def windows(of: Window, image: Window, halo_px: int, most_px: int, step_px: int) -> Iterator[Window]:
