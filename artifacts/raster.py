@@ -1,5 +1,6 @@
 """Windows of mosaics on disk: tiled TIFF, 8-bit RGB or one channel, decoded tile by tile."""
 
+import math
 import os
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -28,7 +29,9 @@ class TiffWindows:
             self._file = tifffile.TiffFile(path)
             self._page: Any = self._file.pages[0]
             self.height_px, self.width_px = (int(n) for n in self._page.shape[:2])
+            self.channels, self.dtype = math.prod(self._page.shape[2:]), np.dtype(self._page.dtype)
             self._rows, self._columns = (int(n) for n in self._page.chunks[:2])
+            self.packed_px = self._rows * self._columns  # unpacked together
         except (OSError, ValueError, IndexError, AttributeError, tifffile.TiffFileError) as error:
             raise BadInput(name, f"its mosaic cannot be read ({error})", REMEDY) from None
         self._across = -(-self.width_px // self._columns)

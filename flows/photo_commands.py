@@ -113,7 +113,7 @@ def detect(
     Parameters
     ----------
     images:
-        An image or a folder of images: JPEG, PNG, BMP, TIFF.
+        An image or a folder of images: JPEG, PNG, BMP, TIFF; mosaics as TIFF, tiled, of any size.
     out:
         Folder to write to.
     method:
@@ -192,11 +192,14 @@ def detected(
     from tasks.detection.task import detect as detect_cracks
     from tasks.measurement.task import measure as measure_cracks
     from tasks.patterns.task import remove_patterns
-    from tasks.photos.task import ingest
-    from tasks.stitching.task import single
+    from tasks.photos.task import ingest, is_larger_than_photos
+    from tasks.stitching.task import given_mosaic, single
 
-    photo = ingest.bare(store.current().put(path), path.name, path.stem, None, None, 5.0)
-    mosaic = single.bare(photo, gsd_mm_px)
+    file = store.current().put(path)
+    if is_larger_than_photos(file):
+        mosaic = given_mosaic(file, path.name, gsd_mm_px)
+    else:
+        mosaic = single.bare(ingest.bare(file, path.name, path.stem, None, None, 5.0), gsd_mm_px)
     patterns = remove_patterns.bare(mosaic, PatternSettings())
     network = store.current().put(model) if model else None
     detection = detect_cracks.bare(mosaic, patterns, settings, network)

@@ -5,9 +5,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import tifffile
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from schemas.problem import BadInput
@@ -17,6 +19,7 @@ Pixels = npt.NDArray[np.uint8]
 FORMATS = ("JPEG", "PNG", "BMP", "TIFF", "HEIF")
 SMALLEST_PX = 32  # per side; less is an icon, not a photo
 LARGEST_PX = 32_000  # per side; OpenCV's remap fails from 32,767
+LARGEST_PHOTO_PX = 200_000_000  # cameras have up to 150 MP
 REMEDY = "Give a JPEG, PNG, BMP, TIFF or HEIC photo, or take this file out of the folder"
 HEIC_BRANDS = (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")  # ISO 23008-12, at byte 8
 
@@ -49,6 +52,16 @@ def read_photo(path: Path, name: str) -> Decoded:
         known = image.format in ("JPEG", "MPO", "PNG") and image.mode in ("RGB", "L")
         plain = known and orientation == 1
     return Decoded(pixels, orientation, plain, exif, xmp if isinstance(xmp, bytes) else xmp.encode())
+
+
+def size_of_tiff(path: Path) -> tuple[int, int] | None:
+    """Width and height in pixels, however large; None where it is no TIFF, or a damaged one."""
+    try:
+        with tifffile.TiffFile(path) as file:
+            page: Any = file.pages[0]
+            return int(page.imagewidth), int(page.imagelength)
+    except (OSError, ValueError, IndexError, struct.error, tifffile.TiffFileError):
+        return None
 
 
 def read_exif(path: Path, name: str) -> Image.Exif:

@@ -78,6 +78,15 @@ def ingest(
     )
 
 
+def is_larger_than_photos(file: File) -> bool:
+    """Whether it is a TIFF of more pixels than a photo can have: a mosaic. No stage: only the command line
+    asks for it."""
+    from tasks.photos.reading import LARGEST_PHOTO_PX, LARGEST_PX, size_of_tiff
+
+    size = size_of_tiff(store.current().path(file))
+    return size is not None and (max(size) > LARGEST_PX or size[0] * size[1] > LARGEST_PHOTO_PX)
+
+
 @stage()
 def assign(photos: tuple[FolderEntry, ...], log: FlightLog) -> tuple[AssignedShot, ...]:
     """Which photo of all folders of a flight is which shot of its log."""

@@ -1,7 +1,7 @@
 """Stages: stitch the photos of a surface; let a photo stand for itself."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,11 @@ from artifacts.match_graph import edge_picture
 from artifacts.mosaic import MosaicWriter
 from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of, thumbnail
+from artifacts.raster import TiffWindows
 from artifacts.uncertainty_map import sigma_mm
 from schemas.contract import Matrix3, Vector2, Vector3
 from schemas.control import Control
+from schemas.file import File
 from schemas.mosaic import MatchEdge, Mosaic, PhotoPlacement
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput, LeftOut
@@ -26,7 +28,6 @@ from tasks.stage import progress, stage
 
 if TYPE_CHECKING:
     from tasks.stitching.compositing import Pixels, Tile
-    from tasks.stitching.control import Sightings
     from tasks.stitching.mosaicking import Registered
     from tasks.stitching.pairs import PhotoFeatures
     from tasks.stitching.relief import HeightMap
@@ -86,6 +87,7 @@ def stitch(
 
     features: of each photo, in their order."""
     from tasks.stitching.mosaicking import blend_photos, register_photos
+    from tasks.stitching.sightings import sightings_in
 
     if not photos:
         raise BadInput(name, "has no photo", "Give it photos, or leave it out")
@@ -93,7 +95,7 @@ def stitch(
     ordered = [photo for photo, _ in described]
     found = [_features(of_photo) for _, of_photo in described]
     read = _reader(ordered)
-    sightings, not_there = _sightings(control, ordered, read) if control else ({}, ())
+    sightings, not_there = sightings_in(control, ordered, read) if control else ({}, ())
     registered = register_photos(
         name,
         surface,
@@ -163,6 +165,27 @@ def single(photo: Photo, gsd_mm_px: float | None) -> Mosaic:
     )
 
 
+def given_mosaic(file: File, name: str, gsd_mm_px: float | None) -> Mosaic:
+    """A mosaic that somebody stitched, of any size: a TIFF of 8-bit RGB, or RGBA whose transparent pixels are
+    blank. Raises BadInput by name; no stage: only the command line asks for it."""
+    from tasks.stitching.given import tiles_of
+
+    with closing(TiffWindows(store.current().path(file), name)) as windows:
+        return _written(
+            tiles_of(windows, name, progress),
+            name=PurePath(name).stem,
+            surface=None,
+            width_px=windows.width_px,
+            height_px=windows.height_px,
+            gsd_mm_px=gsd_mm_px,
+            scale_from="none" if gsd_mm_px is None else "stated GSD",
+            origin_uv_m=(0.0, 0.0),
+            photos=(),
+            placements=(),
+            rms_px=None,
+        )
+
+
 def _features(features: Features) -> "PhotoFeatures":
     from tasks.stitching.pairs import PhotoFeatures
 
@@ -184,43 +207,6 @@ def _height_sigma_m(surface: Surface | None, relief: Relief | None) -> float | N
     if relief is not None:
         return relief.sigma_m
     return None if surface is None else surface.deviation_m / 2
-
-
-def _sightings(
-    control: Control, photos: list[Photo], read: Callable[[int], "Pixels"]
-) -> tuple["Sightings", tuple[LeftOut, ...]]:
-    """Where the photos show the marks, as stated and as tags are found; stated photos that are not there."""
-    from tasks.stitching.tags import find_tags
-
-    number = _numbers([photo.name for photo in photos])
-    stated = [(m, photo, pixel) for m, seen in control.marks.items() for photo, pixel in seen.items()]
-    missing = tuple(
-        LeftOut(
-            item=f"mark {mark}",
-            stage="stitching",
-            what=f"there is no readable photo {photo} in this set",
-            remedy="Correct the photo's name: with its suffix, and its folder where several are called so",
-        )
-        for mark, photo, _ in stated
-        if photo not in number
-    )
-    sightings: dict[str, dict[int, Array]] = {}
-    for mark, photo, pixel in stated:
-        if photo in number:
-            sightings.setdefault(mark, {})[number[photo]] = np.asarray(pixel, float)
-    if control.tags is not None:
-        for i in range(len(photos)):
-            for mark, centre in find_tags(read(i), control.tags).items():
-                sightings.setdefault(mark, {}).setdefault(i, centre)
-    return sightings, missing
-
-
-def _numbers(names: Sequence[str]) -> dict[str, int]:
-    """Of each photo by its name, and by its file's name alone where one photo of these is called so."""
-    files = [PurePath(name).name for name in names]
-    bearers = Counter(files)
-    alone = {file: i for i, file in enumerate(files) if bearers[file] == 1}
-    return alone | {name: i for i, name in enumerate(names)}
 
 
 def _reader(photos: list[Photo]) -> Callable[[int], "Pixels"]:

@@ -1,0 +1,80 @@
+"""Mosaics that other programs made."""
+
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+
+from artifacts import store
+from artifacts.raster import MosaicRaster, TiffWindows
+from schemas.problem import BadInput
+from tasks.photos.reading import size_of_tiff
+from tasks.stitching import given
+from tasks.stitching.task import given_mosaic
+
+RNG = np.random.default_rng(4)
+
+
+def rgba(height: int = 2500, width: int = 2300) -> np.ndarray:
+    pixels = RNG.integers(1, 255, (height // 50, width // 50, 4), np.uint8).repeat(50, 0).repeat(50, 1)
+    pixels[..., 3] = 255
+    pixels[:, :400, 3] = 0
+    return pixels
+
+
+@pytest.mark.parametrize("form", [{"tile": (512, 512)}, {"rowsperstrip": 64}], ids=["tiles", "strips"])
+def test_what_is_transparent_is_blank_and_the_rest_as_it_was(form: dict, tmp_path: Path) -> None:
+    pixels = rgba()
+    tifffile.imwrite(tmp_path / "wall.tif", pixels, photometric="rgb", extrasamples=["unassalpha"], **form)
+    with store.temporary() as files:
+        mosaic = given_mosaic(files.put(tmp_path / "wall.tif"), "wall.tif", 0.5)
+        assert (mosaic.name, mosaic.width_px, mosaic.height_px) == ("wall", 2300, 2500)
+        assert mosaic.covered_m2 == pytest.approx(1900 * 2500 * 0.25e-6)
+        paths = files.path(mosaic.image), files.path(mosaic.coverage)
+        with MosaicRaster(*paths, "wall") as raster:
+            assert (raster.rgb(0, 2500, 400, 2300) == pixels[:, 400:, :3]).all()
+            assert (raster.valid(0, 2500, 0, 2300) == (pixels[..., 3] > 0)).all()
+
+
+def test_without_transparency_all_of_it_is_known(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "wall.tif", rgba()[..., :3], photometric="rgb", tile=(256, 256))
+    with store.temporary() as files:
+        mosaic = given_mosaic(files.put(tmp_path / "wall.tif"), "wall.tif", None)
+        assert mosaic.gsd_mm_px is None and mosaic.covered_m2 is None
+        with closing(TiffWindows(files.path(mosaic.coverage), "wall")) as windows:
+            assert windows.read(0, 2500, 0, 2300).min() == 255
+
+
+@pytest.mark.parametrize(
+    ("pixels", "photometric", "said"),
+    [
+        (np.zeros((300, 300), np.uint16), "minisblack", "16-bit with 1 channels"),
+        (np.zeros((300, 300, 3), np.float32), "rgb", "32-bit with 3 channels"),
+    ],
+)
+def test_another_kind_is_refused_with_what_to_do(
+    pixels: np.ndarray, photometric: str, said: str, tmp_path: Path
+) -> None:
+    tifffile.imwrite(tmp_path / "dem.tif", pixels, tile=(64, 64), photometric=photometric)
+    with store.temporary() as files, pytest.raises(BadInput, match=rf"dem.tif.*{said}.*8-bit RGB"):
+        given_mosaic(files.put(tmp_path / "dem.tif"), "dem.tif", None)
+
+
+def test_what_can_only_be_read_at_once_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(given, "PACKED_PX", 1000)
+    tifffile.imwrite(tmp_path / "wall.tif", rgba()[..., :3], photometric="rgb", rowsperstrip=2500)
+    with store.temporary() as files, pytest.raises(BadInput, match=r"in one piece.*tiled"):
+        given_mosaic(files.put(tmp_path / "wall.tif"), "wall.tif", None)
+
+
+def test_the_size_is_known_without_reading_and_whatever_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "sparse.tif"
+    with tifffile.TiffWriter(path, bigtiff=True) as writer:
+        blank = (b"" for _ in range(200 * 160))
+        writer.write(blank, shape=(80_000, 100_000, 3), dtype=np.uint8, tile=(512, 512), photometric="rgb")
+    assert size_of_tiff(path) == (100_000, 80_000)
+    (tmp_path / "no.tif").write_bytes(path.read_bytes()[:12])
+    (tmp_path / "text.tif").write_text("text")
+    assert size_of_tiff(tmp_path / "no.tif") is None and size_of_tiff(tmp_path / "text.tif") is None
