@@ -79,9 +79,14 @@ def position_sigma_m(inspection: Inspection) -> float:
     return float((inspection.vehicle.position_bias_m**2 + inspection.vehicle.position_jitter_m**2) ** 0.5)
 
 
+def is_photo_file(path: Path) -> bool:
+    """Also a link to nothing: it is named among what is left out, not passed over."""
+    return path.is_file() or path.is_symlink()
+
+
 def _photos_in(folder: Path, stated: str) -> list[Path]:
     photos = folder.iterdir() if folder.is_dir() else ()
-    paths = sorted(p for p in photos if p.suffix.lower() in PHOTO_SUFFIXES and p.is_file())
+    paths = sorted(p for p in photos if p.suffix.lower() in PHOTO_SUFFIXES and is_photo_file(p))
     if not paths:
         raise BadInput(stated, "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
     return paths

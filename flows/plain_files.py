@@ -92,13 +92,13 @@ def one_by_one(
 
 
 def photos_in(path: Path) -> list[Path]:
-    from flows.given_photos import PHOTO_SUFFIXES
+    from flows.given_photos import PHOTO_SUFFIXES, is_photo_file
 
     if path.is_file():
         return [path]
     if not path.is_dir():
         raise BadInput(str(path), "no such file or folder", "Correct the path")
-    paths = sorted(p for p in path.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES and p.is_file())
+    paths = sorted(p for p in path.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES and is_photo_file(p))
     if not paths:
         raise BadInput(str(path), "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
     return paths

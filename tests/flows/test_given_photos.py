@@ -72,3 +72,15 @@ def test_a_flight_on_two_cards_is_one_flight_in_the_order_of_the_clock(
 def test_bitmaps_are_photos_too(tmp_path: Path) -> None:
     photo(tmp_path / "photos/1.BMP", 60)
     assert [s.name for s in given(tmp_path, PhotoSet(folder="photos"))] == ["1.BMP"]
+
+
+def test_a_link_to_nothing_is_named(tmp_path: Path) -> None:
+    photo(tmp_path / "photos/1.png", 60)
+    (tmp_path / "photos/2.jpg").symlink_to("/card/DCIM/2.jpg")
+    (tmp_path / "photos/3.jpg").mkdir()
+    inspection = Inspection(name="wall", photos=(PhotoSet(folder="photos"),))
+    sources, left_out = given_photos(inspection, tmp_path, None)
+    assert [s.name for s in sources] == ["1.png"]
+    assert [(one.item, one.what) for one in left_out] == [
+        ("2.jpg", "cannot be read (No such file or directory)")
+    ]
