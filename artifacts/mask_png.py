@@ -1,5 +1,5 @@
-"""Masks as PNG of one bit a pixel, written and read row by row: other libraries hold a byte a pixel or more,
-and OpenCV reads no more than 2^30 of them (PNG specification, third edition)."""
+"""Masks as grey PNG of any size, written and read row by row: other libraries hold all of it, and OpenCV
+reads no more than 2^30 pixels (PNG specification, third edition)."""
 
 import struct
 import zlib
@@ -8,25 +8,25 @@ from pathlib import Path
 
 import numpy as np
 
-from schemas.bit_mask import BAND_PX, BitMask
+from schemas.bit_mask import BitMask
 from schemas.problem import BadInput
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 HEADER = ">IIBBBBB"  # width, height, bits, colour type, compression, filter, interlace
-ONE_BIT_GREY = (1, 0, 0, 0, 0)
+EIGHT_BIT_GREY = (8, 0, 0, 0, 0)  # not one bit: some programs read that as 0 and 1
+WHITE = np.uint8(255)
 LEVEL = 1  # of zlib: masks are mostly empty
 
 
 def write_mask(mask: BitMask, path: Path) -> None:
-    """White where the mask is set, black elsewhere."""
+    """255 where the mask is set, 0 elsewhere."""
     packer = zlib.compressobj(LEVEL)
     with path.open("wb") as file:
         file.write(SIGNATURE)
-        header = struct.pack(HEADER, mask.width_px, mask.height_px, *ONE_BIT_GREY)
+        header = struct.pack(HEADER, mask.width_px, mask.height_px, *EIGHT_BIT_GREY)
         file.write(_chunk(b"IHDR", header))
-        for top in range(0, mask.height_px, BAND_PX):
-            rows = mask.rows[top : top + BAND_PX]
-            unfiltered = np.pad(rows, ((0, 0), (1, 0)))  # each row begins with its filter: 0, none
+        for _, band in mask.bands():
+            unfiltered = np.pad(WHITE * band, ((0, 0), (1, 0)))  # each row begins with its filter: 0, none
             if packed := packer.compress(unfiltered.tobytes()):
                 file.write(_chunk(b"IDAT", packed))
         file.write(_chunk(b"IDAT", packer.flush()))
@@ -41,8 +41,8 @@ def read_mask(path: Path, name: str) -> BitMask:
                 raise ValueError("no PNG")
             chunks = _chunks(file.read)
             width, height, *kind = struct.unpack(HEADER, next(chunks)[1])
-            if tuple(kind) != ONE_BIT_GREY:
-                raise ValueError("not of one bit a pixel")
+            if tuple(kind) != EIGHT_BIT_GREY:
+                raise ValueError("not of 8-bit grey")
             mask = BitMask(height, width)
             _fill(mask, (data for name_, data in chunks if name_ == b"IDAT"))
             return mask
@@ -66,13 +66,15 @@ def _chunks(read: Callable[[int], bytes]) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _fill(mask: BitMask, packed: Iterator[bytes]) -> None:
-    unpacker, row_bytes = zlib.decompressobj(), 1 + mask.rows.shape[1]
+    unpacker, row_bytes = zlib.decompressobj(), 1 + mask.width_px
     waiting, top = b"", 0
     for data in packed:
         waiting += unpacker.decompress(data)
         count = len(waiting) // row_bytes
         rows = np.frombuffer(waiting, dtype=np.uint8, count=count * row_bytes).reshape(count, row_bytes)
-        mask.rows[top : top + count] = rows[:, 1:]
+        if rows[:, 0].any():
+            raise ValueError("another program wrote it")
+        mask.write(top, 0, rows[:, 1:] > 0)
         waiting, top = waiting[count * row_bytes :], top + count
     if top != mask.height_px or waiting:
         raise ValueError("cut short")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from artifacts.mask_png import read_mask, write_mask
 from schemas.bit_mask import BitMask
@@ -25,6 +26,7 @@ def test_any_image_viewer_sees_what_we_read_back(
     write_mask(BitMask.of(mask), path)
     assert (read_mask(path, "wall").whole() == mask).all()
     assert (np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)) == np.where(mask, 255, 0)).all()
+    assert (np.asarray(Image.open(path)) == np.where(mask, 255, 0)).all()
 
 
 def test_a_mask_with_more_pixels_than_opencv_reads(tmp_path: Path) -> None:
@@ -42,8 +44,18 @@ def test_what_is_cut_short_or_damaged_or_another_png_is_named(tmp_path: Path) ->
     write_mask(BitMask.of(blotches(300, 200)), path)
     content = path.read_bytes()
     cv2.imwrite(str(path), np.zeros((30, 40), np.uint8))
+    theirs = path.read_bytes()
+    cv2.imwrite(str(path), np.zeros((30, 40, 3), np.uint8))
     flipped = content[:900] + bytes([content[900] ^ 1]) + content[901:]
-    for wrong in (path.read_bytes(), content[:-20], content[: len(content) // 2], flipped, b"", b"text"):
+    for wrong in (
+        theirs,
+        path.read_bytes(),
+        content[:-20],
+        content[: len(content) // 2],
+        flipped,
+        b"",
+        b"text",
+    ):
         path.write_bytes(wrong)
         with pytest.raises(BadInput, match=r"pier: its mask cannot be read"):
             read_mask(path, "pier")
