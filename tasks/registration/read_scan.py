@@ -70,10 +70,11 @@ def scan_blocks(
 ) -> Iterator[LoadedScan]:
     """Scan number `index` (from 0) in blocks of at most a million points; none is empty.
 
-    Points that are NaN, infinite or off the Earth are dropped. Coordinates beyond 1 km (UTM) lose a rounded
-    origin, the same in all blocks, so that float32 keeps them exact later on. Raises BadInput under `name`
-    for a file that cannot be read, is cut short, holds no finite point, or, after the last block, whose
-    extent no structure has: 40 km or 40 mm say that the unit is not the stated one.
+    Points that are NaN, infinite, off the Earth, or repeatedly (0, 0, 0), as programs write shots without
+    an echo, are dropped. Coordinates beyond 1 km (UTM) lose a rounded origin, the same in all blocks, so that
+    float32 keeps them exact later on. Raises BadInput under `name` for a file that cannot be read, is cut
+    short, holds no usable point, or, after the last block, whose extent no structure has: 40 km or 40 mm say
+    that the unit is not the stated one.
     """
     name = name or path.name
     origin_m: Array | None = None
@@ -83,17 +84,20 @@ def scan_blocks(
         for scan in _reader(path, name).read(path, index):
             empty = empty and len(scan.points) == 0
             with np.errstate(all="ignore"):  # damaged bytes make odd floats
-                finite = np.asarray((np.abs(scan.points) < FARTHEST_M / unit_m).all(axis=1))  # NaN is not
-            if not finite.any():
+                usable = np.asarray((np.abs(scan.points) < FARTHEST_M / unit_m).all(axis=1))  # NaN is not
+            at_zero = ~scan.points.any(axis=1)
+            if at_zero.sum() > 1:  # a point may lie there; many are shots without an echo
+                usable &= ~at_zero
+            if not usable.any():
                 continue
-            points_m = scan.points[finite] * unit_m
+            points_m = scan.points[usable] * unit_m
             if origin_m is None:
                 middle_m = np.median(points_m, axis=0)
                 origin_m = np.where(np.abs(middle_m) > LARGE_COORDINATE_M, np.round(middle_m, -2), 0.0)
             samples.append(points_m[:: max(1, len(scan.points) // SAMPLED)])
             yield LoadedScan(
                 points_m - origin_m,
-                _unit_normals(scan.normals, finite),
+                _unit_normals(scan.normals, usable),
                 _pose_of_shifted(scan, unit_m, origin_m),
                 _viewpoint(scan, unit_m, origin_m),
                 origin_m,
@@ -101,7 +105,7 @@ def scan_blocks(
     if empty:
         raise BadInput(name, "it holds no points", "Export the scan again and check that it has points.")
     if not samples:
-        raise BadInput(name, "none of its points is finite (NaN)", "Export the scan again.")
+        raise BadInput(name, "all of its points are NaN or (0, 0, 0)", "Export the scan again.")
     _check_extent(np.concatenate(samples), unit_m, name)
 
 

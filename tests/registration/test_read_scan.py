@@ -156,6 +156,15 @@ def literal_lzf(data: bytes) -> bytes:
     return b"".join(bytes([len(run) - 1]) + run for run in runs)
 
 
+def test_shots_without_an_echo_are_dropped(tmp_path: Path) -> None:
+    """Programs write them as (0, 0, 0), in a map's coordinates 5,500 km away from the scan."""
+    utm = POINTS + np.array([467_123.0, 5_512_345.0, 312.0])
+    scan = read_scan(written(tmp_path, "utm.xyz", rows(np.vstack([np.zeros((3, 3)), utm]))))
+    assert np.allclose(scan.points_m + scan.origin_m, utm, atol=1e-9)
+    with pytest.raises(BadInput, match=r"none.xyz: all of its points are NaN or \(0, 0, 0\)"):
+        read_scan(written(tmp_path, "none.xyz", rows(np.zeros((200, 3)))))
+
+
 def test_pcd_encodings(tmp_path: Path) -> None:
     table = np.zeros(4, dtype=[("xyz", "<f8", 3), ("_", "u1", 4)])
     table["xyz"] = POINTS
