@@ -5,7 +5,7 @@ import os
 from contextlib import ExitStack, closing
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import cv2
 import numpy as np
@@ -21,21 +21,31 @@ MOST_LEVELS = 16  # that somebody draws: a level for each kind of crack
 
 
 class TiffWindows:
-    """Reads any window of a tiled (or striped) TIFF. Safe to use from several threads."""
+    """Reads any window of a tiled (or striped) TIFF. Safe to use from several threads.
 
-    def __init__(self, path: Path, name: str) -> None:
-        self._name = name
-        try:
-            self._file = tifffile.TiffFile(path)
-            self._page: Any = self._file.pages[0]
-            self.height_px, self.width_px = (int(n) for n in self._page.shape[:2])
-            self.channels, self.dtype = math.prod(self._page.shape[2:]), np.dtype(self._page.dtype)
-            self._rows, self._columns = (int(n) for n in self._page.chunks[:2])
-            self.packed_px = self._rows * self._columns  # unpacked together
-        except (OSError, ValueError, IndexError, AttributeError, tifffile.TiffFileError) as error:
-            raise BadInput(name, f"its mosaic cannot be read ({error})", REMEDY) from None
+    remedy: what to do where it cannot be read."""
+
+    def __init__(self, path: Path, name: str, remedy: str = REMEDY) -> None:
+        self._name, self._remedy = name, remedy
+        with ExitStack() as opened:
+            try:
+                self._file = opened.enter_context(tifffile.TiffFile(path))
+                self._page: Any = cast(Any, self._file.pages[0])
+                self.height_px, self.width_px = (int(n) for n in self._page.shape[:2])
+                self.channels, self.dtype = math.prod(self._page.shape[2:]), np.dtype(self._page.dtype)
+                self._rows, self._columns = (int(n) for n in self._page.chunks[:2])
+                if self._page.planarconfig != tifffile.PLANARCONFIG.CONTIG:
+                    raise ValueError("its colours lie apart, one plane after the other")
+            except (OSError, ValueError, IndexError, AttributeError, tifffile.TiffFileError) as error:
+                raise BadInput(name, f"its mosaic cannot be read ({error})", remedy) from None
+            opened.pop_all()  # nothing went wrong: it stays open until close()
         self._across = -(-self.width_px // self._columns)
         self._descriptor = self._file.filehandle.fileno()
+
+    @property
+    def packed_px(self) -> tuple[int, int]:
+        """Rows and columns that are packed together."""
+        return self._rows, self._columns
 
     def read(self, y0: int, y1: int, x0: int, x1: int) -> npt.NDArray[Any]:
         """(y1 − y0, x1 − x0[, channels]) of rows y0..y1 and columns x0..x1."""
@@ -59,8 +69,8 @@ class TiffWindows:
         try:
             data = os.pread(self._descriptor, size, offset)
             decoded, _, _ = self._page.decode(data, index, jpegtables=self._page.jpegtables)
-        except Exception as error:  # whatever a codec raises over damaged bytes
-            raise BadInput(self._name, f"its mosaic is damaged ({error})", REMEDY) from None
+        except Exception as error:  # whatever a codec raises over damaged bytes, or where it is missing
+            raise BadInput(self._name, f"its mosaic cannot be unpacked ({error})", self._remedy) from None
         tile = decoded[0]
         return np.asarray(tile if len(self._page.shape) == 3 else tile[..., 0])
 

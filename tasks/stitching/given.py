@@ -10,9 +10,13 @@ import numpy.typing as npt
 from schemas.problem import BadInput
 from tasks.stitching.compositing import Pixels, Tile
 
-SIDE_PX = 2048  # of a tile
+SIDE_PX = 2048  # of a window
+STEP_PX = 256  # that ends of windows are multiples of
 PACKED_PX = 1 << 26  # that are packed together, at most: they are unpacked together
-REMEDY = "Save it as a tiled TIFF of 8-bit RGB, or RGBA with what is blank transparent"
+REMEDY = (
+    "Save it as a tiled TIFF of 8-bit RGB, or RGBA with what is blank transparent, packed by DEFLATE or not:"
+    " gdal_translate -co TILED=YES -co COMPRESS=DEFLATE"
+)
 
 
 class Windows(Protocol):
@@ -20,7 +24,9 @@ class Windows(Protocol):
     width_px: int
     channels: int
     dtype: np.dtype[np.generic]
-    packed_px: int  # pixels that are packed together
+
+    @property
+    def packed_px(self) -> tuple[int, int]: ...
 
     def read(self, y0: int, y1: int, x0: int, x1: int) -> npt.NDArray[np.uint8]: ...
 
@@ -30,11 +36,13 @@ def tiles_of(windows: Windows, name: str, on_progress: Callable[[float], None]) 
     if windows.dtype != np.uint8 or windows.channels not in (3, 4):
         kind = f"{8 * windows.dtype.itemsize}-bit with {windows.channels} channels"
         raise BadInput(name, f"is a mosaic of another kind ({kind})", REMEDY)
-    if windows.packed_px > PACKED_PX:
+    rows, columns = windows.packed_px
+    if rows * columns > PACKED_PX:
         raise BadInput(name, "is a mosaic in one piece: none of it can be read without all of it", REMEDY)
-    corners = product(range(0, windows.height_px, SIDE_PX), range(0, windows.width_px, SIDE_PX))
-    for y, x in corners:
-        bottom, right = min(windows.height_px, y + SIDE_PX), min(windows.width_px, x + SIDE_PX)
+    # strips are unpacked whole: each once
+    high, wide = (SIDE_PX, SIDE_PX) if columns < windows.width_px else (STEP_PX, windows.width_px)
+    for y, x in product(range(0, windows.height_px, high), range(0, windows.width_px, wide)):
+        bottom, right = min(windows.height_px, y + high), min(windows.width_px, x + wide)
         pixels = windows.read(y, bottom, x, right)
         yield Tile(x, y, *_covered(pixels))
         on_progress((y * windows.width_px + (bottom - y) * right) / (windows.height_px * windows.width_px))

@@ -168,9 +168,9 @@ def single(photo: Photo, gsd_mm_px: float | None) -> Mosaic:
 def given_mosaic(file: File, name: str, gsd_mm_px: float | None) -> Mosaic:
     """A mosaic that somebody stitched, of any size: a TIFF of 8-bit RGB, or RGBA whose transparent pixels are
     blank. Raises BadInput by name; no stage: only the command line asks for it."""
-    from tasks.stitching.given import tiles_of
+    from tasks.stitching.given import REMEDY, tiles_of
 
-    with closing(TiffWindows(store.current().path(file), name)) as windows:
+    with closing(TiffWindows(store.current().path(file), name, REMEDY)) as windows:
         return _written(
             tiles_of(windows, name, progress),
             name=PurePath(name).stem,

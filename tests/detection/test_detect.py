@@ -108,19 +108,21 @@ def test_masked_pixels_have_no_say() -> None:
 
 @pytest.mark.parametrize("settings", [RIDGE, PAPER], ids=["ridge", "paper"])
 def test_windows_give_what_the_whole_gives(settings: DetectSettings, monkeypatch: pytest.MonkeyPatch) -> None:
-    rgb = rough(420, 300, contrast=0.08)
-    with_crack(rgb, 200, 4, 0.7, 10, 290)
-    cv2.circle(rgb, (240, 128), 14, (45, 45, 45), cv2.FILLED)  # compact
+    rgb = rough(620, 500, contrast=0.08)
+    with_crack(rgb, 200, 4, 0.7, 10, 490)
+    for at in range(20, 600, 45):
+        cv2.circle(rgb, (340, at), 14, (45, 45, 45), cv2.FILLED)  # compact
     cv2.rectangle(rgb, (60, 290), (210, 390), (45, 45, 45), cv2.FILLED)  # shade, larger than the window
     valid = np.ones(rgb.shape[:2], dtype=bool)
     valid[:, :30], valid[180:230, 120:150] = False, False
     peaks = Peaks(peaks=(60, 150), i_surface=150)
-    masks = []
+    masks, told = [], []
     for most_px, step_px in ((windows.MOST_PX, windows.STEP_PX), (1, 8)):
         monkeypatch.setattr(windows, "MOST_PX", most_px)
         monkeypatch.setattr(windows, "STEP_PX", step_px)
-        masks.append(detect_raster(ArrayRaster(rgb, valid), settings, 2.0, peaks).mask)
-    assert masks[0].any() and (masks[0] == masks[1]).all()
+        told.clear()
+        masks.append(detect_raster(ArrayRaster(rgb, valid), settings, 2.0, peaks, told.append).mask)
+    assert len(told) > 3 and masks[0].any() and (masks[0] == masks[1]).all()
 
 
 @pytest.mark.parametrize("method", ["hairline", "ridge", "paper", "global"])

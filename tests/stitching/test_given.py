@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from PIL import Image
 
 from artifacts import store
 from artifacts.raster import MosaicRaster, TiffWindows
@@ -60,6 +61,26 @@ def test_another_kind_is_refused_with_what_to_do(
     tifffile.imwrite(tmp_path / "dem.tif", pixels, tile=(64, 64), photometric=photometric)
     with store.temporary() as files, pytest.raises(BadInput, match=rf"dem.tif.*{said}.*8-bit RGB"):
         given_mosaic(files.put(tmp_path / "dem.tif"), "dem.tif", None)
+
+
+def test_what_no_codec_here_unpacks_or_lies_in_planes_is_told_with_what_to_do(tmp_path: Path) -> None:
+    Image.fromarray(rgba(300, 400)[..., :3]).save(tmp_path / "lzw.tif", compression="tiff_lzw")
+    planes = np.moveaxis(rgba(300, 400)[..., :3], -1, 0)
+    tifffile.imwrite(
+        tmp_path / "planes.tif", planes, planarconfig="separate", photometric="rgb", tile=(64, 64)
+    )
+    for name, said in (("lzw.tif", "LZW"), ("planes.tif", "colours lie apart")):
+        with store.temporary() as files, pytest.raises(BadInput, match=rf"{name}.*{said}.*COMPRESS=DEFLATE"):
+            given_mosaic(files.put(tmp_path / name), name, None)
+
+
+def test_strips_are_unpacked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tifffile.imwrite(tmp_path / "wall.tif", rgba()[..., :3], photometric="rgb", rowsperstrip=64)
+    unpacked, unpack = [], TiffWindows._tile
+    monkeypatch.setattr(TiffWindows, "_tile", lambda self, n: unpacked.append(n) or unpack(self, n))
+    with store.temporary() as files:
+        given_mosaic(files.put(tmp_path / "wall.tif"), "wall.tif", None)
+    assert sorted(unpacked) == list(range(-(-2500 // 64)))
 
 
 def test_what_can_only_be_read_at_once_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
