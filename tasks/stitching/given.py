@@ -14,7 +14,7 @@ SIDE_PX = 2048  # of a window
 STEP_PX = 256  # that ends of windows are multiples of
 PACKED_PX = 1 << 26  # that are packed together, at most: they are unpacked together
 REMEDY = (
-    "Save it as a tiled TIFF of 8-bit RGB, or RGBA with what is blank transparent, packed by DEFLATE or not:"
+    "Save it as a tiled TIFF of 8-bit RGB, or RGBA with what is blank transparent:"
     " gdal_translate -co TILED=YES -co COMPRESS=DEFLATE"
 )
 
