@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import tifffile
 
+from artifacts.geotiff import NODATA, SCALE
+
 TILE_PX = 256
 CLASSIC_LIMIT = 3_500_000_000  # raw bytes from which on the file is a BigTIFF
 LEVEL = 1  # of deflate: photos hardly compress, so quickly
@@ -44,7 +46,7 @@ class Georeference:
             return []
         step, (u, v) = self.gsd_mm_px / 1000.0, self.origin_uv_m
         corner = (0.0, 0.0, 0.0, u - step / 2, v + step / 2, 0.0)
-        return [(33550, "d", 3, (step, step, 0.0), True), (33922, "d", 6, corner, True)]
+        return [(SCALE, "d", 3, (step, step, 0.0), True), (33922, "d", 6, corner, True)]
 
 
 class TiledTiff:
@@ -134,6 +136,7 @@ class TiledTiff:
                     yield self._waiting_bytes(place) if place in self._where else blank
 
         gsd_mm_px = self._place.gsd_mm_px
+        blank_value = [(NODATA, "s", 0, "0", True)] if self._channels else []
         raw = int(np.prod((*self._levels[0], *self._channels))) * self._dtype.itemsize
         with tifffile.TiffWriter(self._path, bigtiff=raw > CLASSIC_LIMIT) as writer:
             for level, size in enumerate(self._levels):
@@ -153,7 +156,7 @@ class TiledTiff:
                     resolutionunit=None if per_cm is None else "CENTIMETER",
                     subifds=len(self._levels) - 1 if first else None,
                     subfiletype=0 if first else 1,
-                    extratags=self._place.tags if first else (),
+                    extratags=[*self._place.tags, *blank_value] if first else (),
                 )
         self._discard()
 

@@ -121,7 +121,8 @@ def detect(
         paper: the paper's method, step by step. global: one threshold for the whole image. onnx: a network
         of yours.
     gsd_mm_px:
-        Ground sample distance, mm per pixel; without it results are in pixels only.
+        Ground sample distance, mm per pixel; without it results are in pixels only, but of a GeoTIFF, which
+        tells it.
     global_threshold:
         Grey level of `global`, 1 to 254. Default: from the histogram's peaks.
     model:
@@ -192,11 +193,11 @@ def detected(
     from tasks.detection.task import detect as detect_cracks
     from tasks.measurement.task import measure as measure_cracks
     from tasks.patterns.task import remove_patterns
-    from tasks.photos.task import ingest, is_larger_than_photos
+    from tasks.photos.task import ingest, is_mosaic
     from tasks.stitching.task import given_mosaic, single
 
     file = store.current().put(path)
-    if is_larger_than_photos(file):
+    if is_mosaic(file):
         mosaic = given_mosaic(file, path.name, gsd_mm_px)
     else:
         mosaic = single.bare(ingest.bare(file, path.name, path.stem, None, None, 5.0), gsd_mm_px)

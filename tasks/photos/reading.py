@@ -5,11 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import tifffile
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from schemas.problem import BadInput
@@ -52,16 +50,6 @@ def read_photo(path: Path, name: str) -> Decoded:
         known = image.format in ("JPEG", "MPO", "PNG") and image.mode in ("RGB", "L")
         plain = known and orientation == 1
     return Decoded(pixels, orientation, plain, exif, xmp if isinstance(xmp, bytes) else xmp.encode())
-
-
-def size_of_tiff(path: Path) -> tuple[int, int] | None:
-    """Width and height in pixels, however large; None where it is no TIFF, or a damaged one."""
-    try:
-        with tifffile.TiffFile(path) as file:
-            page: Any = file.pages[0]
-            return int(page.imagewidth), int(page.imagelength)
-    except (OSError, ValueError, IndexError, struct.error, tifffile.TiffFileError):
-        return None
 
 
 def read_exif(path: Path, name: str) -> Image.Exif:

@@ -78,13 +78,19 @@ def ingest(
     )
 
 
-def is_larger_than_photos(file: File) -> bool:
-    """Whether it is a TIFF of more pixels than a photo can have: a mosaic. No stage: only the command line
-    asks for it."""
-    from tasks.photos.reading import LARGEST_PHOTO_PX, LARGEST_PX, size_of_tiff
+def is_mosaic(file: File) -> bool:
+    """Whether it is a TIFF with a place on a map, blank parts, or more pixels than photos have. No stage:
+    only the command line asks for it."""
+    from artifacts.geotiff import told_by
+    from tasks.photos.reading import LARGEST_PHOTO_PX, LARGEST_PX
 
-    size = size_of_tiff(store.current().path(file))
-    return size is not None and (max(size) > LARGEST_PX or size[0] * size[1] > LARGEST_PHOTO_PX)
+    told = told_by(store.current().path(file))
+    if told is None:
+        return False
+    large = (
+        max(told.width_px, told.height_px) > LARGEST_PX or told.width_px * told.height_px > LARGEST_PHOTO_PX
+    )
+    return large or told.placed or told.transparent or told.nodata is not None
 
 
 @stage()

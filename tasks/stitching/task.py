@@ -166,19 +166,25 @@ def single(photo: Photo, gsd_mm_px: float | None) -> Mosaic:
 
 
 def given_mosaic(file: File, name: str, gsd_mm_px: float | None) -> Mosaic:
-    """A mosaic that somebody stitched, of any size: a TIFF of 8-bit RGB, or RGBA whose transparent pixels are
-    blank. Raises BadInput by name; no stage: only the command line asks for it."""
+    """A mosaic that somebody stitched, of any size: a TIFF of 8-bit RGB, blank where it is transparent or of
+    the value that its tags name. Its own scale where none is given. Raises BadInput by name; no stage: only
+    the command line asks for it."""
+    from artifacts.geotiff import told_by
     from tasks.stitching.given import REMEDY, tiles_of
 
-    with closing(TiffWindows(store.current().path(file), name, REMEDY)) as windows:
+    path = store.current().path(file)
+    told = told_by(path)
+    own_gsd_mm_px, nodata = (None, None) if told is None else (told.gsd_mm_px, told.nodata)
+    scale_from = "the file itself" if own_gsd_mm_px else "none"
+    with closing(TiffWindows(path, name, REMEDY)) as windows:
         return _written(
-            tiles_of(windows, name, progress),
+            tiles_of(windows, name, nodata, progress),
             name=PurePath(name).stem,
             surface=None,
             width_px=windows.width_px,
             height_px=windows.height_px,
-            gsd_mm_px=gsd_mm_px,
-            scale_from="none" if gsd_mm_px is None else "stated GSD",
+            gsd_mm_px=gsd_mm_px or own_gsd_mm_px,
+            scale_from="stated GSD" if gsd_mm_px else scale_from,
             origin_uv_m=(0.0, 0.0),
             photos=(),
             placements=(),

@@ -9,9 +9,11 @@ import tifffile
 from PIL import Image
 
 from artifacts import store
+from artifacts.geotiff import told_by
+from artifacts.mosaic import Georeference, TiledTiff
 from artifacts.raster import MosaicRaster, TiffWindows
 from schemas.problem import BadInput
-from tasks.photos.reading import size_of_tiff
+from tasks.photos.task import is_mosaic
 from tasks.stitching import given
 from tasks.stitching.task import given_mosaic
 
@@ -111,7 +113,63 @@ def test_the_size_is_known_without_reading_and_whatever_it_is(tmp_path: Path) ->
     with tifffile.TiffWriter(path, bigtiff=True) as writer:
         blank = (b"" for _ in range(200 * 160))
         writer.write(blank, shape=(80_000, 100_000, 3), dtype=np.uint8, tile=(512, 512), photometric="rgb")
-    assert size_of_tiff(path) == (100_000, 80_000)
+    told = told_by(path)
+    assert told is not None and (told.width_px, told.height_px) == (100_000, 80_000)
     (tmp_path / "no.tif").write_bytes(path.read_bytes()[:12])
     (tmp_path / "text.tif").write_text("text")
-    assert size_of_tiff(tmp_path / "no.tif") is None and size_of_tiff(tmp_path / "text.tif") is None
+    assert told_by(tmp_path / "no.tif") is None and told_by(tmp_path / "text.tif") is None
+
+
+def geotiff(path: Path, steps: tuple[float, float], **keys: int) -> Path:
+    """Of 0.5 m steps, say; keys by their GeoTIFF number."""
+    entries = [
+        n for key, value in sorted((int(k[1:]), v) for k, v in keys.items()) for n in (key, 0, 1, value)
+    ]
+    tags = [(33550, "d", 3, (*steps, 0.0), True), (33922, "d", 6, (0, 0, 0, 5e5, 5e6, 0.0), True)]
+    tags += [(34735, "H", 4 + len(entries), (1, 1, 0, len(keys), *entries), True)] if keys else []
+    tifffile.imwrite(path, rgba(300, 400)[..., :3], photometric="rgb", tile=(64, 64), extratags=tags)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("steps", "keys", "gsd_mm_px"),
+    [
+        ((0.0004, 0.0004), {}, 0.4),
+        ((0.0004, 0.0004), {"_1024": 1, "_3072": 32632, "_3076": 9001}, 0.4),
+        ((0.001, 0.001), {"_1024": 1, "_3072": 2263, "_3076": 9003}, 0.3048),  # US survey feet
+        ((4e-9, 4e-9), {"_1024": 2, "_2048": 4326}, None),  # degrees
+        ((0.0004, 0.0004), {"_1024": 1, "_3072": 3857}, None),  # Web Mercator's metres are none
+        ((0.0004, 0.0007), {}, None),
+        ((1.0, 1.0), {}, None),  # pixels
+    ],
+)
+def test_a_mosaic_on_a_map_tells_its_scale(
+    steps: tuple[float, float], keys: dict[str, int], gsd_mm_px: float | None, tmp_path: Path
+) -> None:
+    path = geotiff(tmp_path / "wall.tif", steps, **keys)
+    with store.temporary() as files:
+        file = files.put(path)
+        assert is_mosaic(file)
+        mosaic = given_mosaic(file, "wall.tif", None)
+        assert mosaic.gsd_mm_px == (None if gsd_mm_px is None else pytest.approx(gsd_mm_px, rel=1e-5))
+        assert given_mosaic(file, "wall.tif", 0.7).gsd_mm_px == 0.7
+
+
+def test_our_own_mosaic_comes_back_with_its_scale_and_its_blank_parts(tmp_path: Path) -> None:
+    place = Georeference(0.5, (0.0, 0.0), "wall")
+    with TiledTiff(tmp_path / "wall.tif", 700, 300, 3, np.uint8, place) as tiff:
+        tiff.put(256, 0, np.full((256, 256, 3), 90, np.uint8))
+    with store.temporary() as files:
+        file = files.put(tmp_path / "wall.tif")
+        assert is_mosaic(file)
+        mosaic = given_mosaic(file, "wall.tif", None)
+        assert mosaic.gsd_mm_px == 0.5
+        with closing(TiffWindows(files.path(mosaic.coverage), "wall")) as windows:
+            known = windows.read(0, 300, 0, 700) > 0
+    assert known[:256, 256:512].all() and known.sum() == 256 * 256
+
+
+def test_a_photo_saved_as_tiff_is_no_mosaic(tmp_path: Path) -> None:
+    Image.fromarray(rgba(300, 400)[..., :3]).save(tmp_path / "photo.tif")
+    with store.temporary() as files:
+        assert not is_mosaic(files.put(tmp_path / "photo.tif"))
