@@ -9,7 +9,11 @@ from tasks.simulation.crack import CrackShape
 STEP_PX = 1.0  # between the points of a crack
 SUPERSAMPLED = 8  # of the truth, along each axis
 VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
-SMOOTH = 0.5  # share of cracks without roughness
+SMOOTH = 0.15  # share of cracks without roughness
+# Shares of the heading's roughness at each correlation length in pixels: a crack goes around grains of every
+# size. Chords of 8, 16, 32 and 64 px turn by 21, 25, 27 and 33° RMS with branches; real ones by 19 to 26°.
+BENDS_PX = {3.0: 1.7, 10.0: 0.9, 30.0: 0.4, 100.0: 0.3}
+JAGGED_DEG = (5.0, 22.0)  # RMS of the heading that such a share stands for
 DOUBTFUL = 128  # in a truth: no answer is wrong here
 LEAST_DARK = 1.5  # RMS of the surface around, that a stretch of crack is darker by where one can tell it
 STRETCH_PX = 31  # that darkness is averaged over along a crack; the surface is looked at as far to each side
@@ -77,11 +81,11 @@ def one_crack(
     rng: Rng, start: Array, heading: float, side_m: float, px_m: float, trunk: CrackShape | None = None
 ) -> CrackShape:
     n = int(rng.uniform(80, 700) if trunk is None else rng.uniform(40, 250))
-    smooth = rng.random() < SMOOTH  # seen from near, a crack bends slowly: no roughness at the pixels' scale
-    turn = np.radians(rng.uniform(5, 40))
-    jitter = np.radians(rng.uniform(0, 6) if smooth else rng.uniform(6, 35))
-    bends_px = float(np.exp(rng.uniform(np.log(15), np.log(200))))
-    path = heading + turn * walk(rng, n, bends_px) + jitter * walk(rng, n, 3.0)
+    smooth = rng.random() < SMOOTH  # bends slowly: no roughness at the pixels' scale
+    jagged = np.radians(np.exp(rng.uniform(*np.log(JAGGED_DEG))))
+    path = np.full(n, heading)
+    for bend_px, share in BENDS_PX.items():
+        path += 0.0 if smooth and bend_px < 30.0 else share * jagged * walk(rng, n, bend_px)
     uv = start + STEP_PX * px_m * np.cumsum(np.column_stack([np.cos(path), np.sin(path)]), axis=0)
     inside = np.flatnonzero(((uv < 0) | (uv > side_m)).any(axis=1))
     n = int(inside[0]) if len(inside) else n

@@ -14,6 +14,7 @@ SIDE_PX = 224
 ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
 DRAWN = 0.1  # share of the crops of photos on which further cracks are drawn: real surfaces, known cracks
 LENT = 0.25  # share of all crops on which the cracks of another photo are laid
+FADED = 0.25  # share of all crops whose cracks are made fainter
 LENT_SCALES = (0.5, 6.0)  # seen from near they are wide, and the surface still sharp
 AROUND_PX = 41  # the surface beside a crack is told from this far around it
 FOLDS = 5
@@ -88,6 +89,8 @@ def crop(photo: Photo, lender: Photo, rng: Rng) -> tuple[Floats, Floats]:
     rgb = photo.rgb if scale > 0.8 else _softened(photo.rgb, at, scale)
     looks = _warped(rgb, A).astype(np.float32) / np.float32(255.0)
     truth = (_warped(photo.truth, A) > 110).astype(np.float32)
+    if rng.random() < FADED:
+        looks = _faded(looks, _warped(photo.kept, A).astype(np.float32) / np.float32(255.0), rng)
     if rng.random() < photo.drawn:
         looks, truth = _cracked(looks, truth, rng)
     if len(lender.on_crack) and rng.random() < LENT:
@@ -139,6 +142,12 @@ def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:
     both = np.maximum(truth, np.dstack([crack, _line(crack), crack]))
     both[..., 2] *= (drawn != DOUBTFUL) | (truth[..., 0] > 0)
     return cracked, both
+
+
+def _faded(rgb: Floats, kept: Floats, rng: Rng) -> Floats:
+    """The photo's own cracks nearer to the brightness around them, and still to be seen."""
+    lifted = np.maximum(kept, np.float32(0.05)) ** np.float32(-rng.uniform(0.2, 0.7))
+    return np.minimum(rgb * lifted[..., None], np.float32(1.0))
 
 
 def _warped(picture: Pixels, A: npt.NDArray[np.float64]) -> Pixels:

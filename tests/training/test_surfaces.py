@@ -11,8 +11,8 @@ import pytest
 from tasks.simulation.crack import CrackShape
 from tests.development_data import development_data
 from training import surfaces
-from training.cracks import DOUBTFUL, seen, told
-from training.photos import ON_CRACK, SIDE_PX, Photo, by_fold, crop, read
+from training.cracks import DOUBTFUL, one_crack, seen, told
+from training.photos import ON_CRACK, SIDE_PX, Photo, _faded, by_fold, crop, read
 from training.surfaces import main, surface
 
 NOWHERE = np.zeros((0, 2), np.int32)
@@ -62,6 +62,31 @@ def test_a_crack_drawn_on_a_photo_is_dark_and_true() -> None:
         assert mask[2].all() and mask[0].any()
         contrast.append(looks[:, mask[0] == 0].mean() - looks[:, mask[1] > 0].mean())
     assert np.median(contrast) > 0.1
+
+
+@pytest.mark.parametrize("chord_px", [8, 16, 32, 64])
+def test_cracks_turn_as_real_ones_do(chord_px: int) -> None:
+    """Real ones by 19 to 26° RMS from chord to chord of any length (bench-detection, part turns), counted
+    through their junctions; here without any."""
+    turns: list[float] = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        uv = one_crack(rng, np.full(2, 500.0), rng.uniform(0, 2 * np.pi), 1000.0, 1.0).uv_m
+        steps = np.diff(uv[::chord_px], axis=0)
+        turns += np.degrees(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))).tolist()
+    assert 13.0 < np.sqrt(np.mean(np.square(turns))) < 28.0
+
+
+def test_a_faded_crack_is_fainter_and_the_surface_as_it_was() -> None:
+    photo = _line()
+    kept = photo.kept.astype(np.float32) / np.float32(255)
+    rgb = photo.rgb.astype(np.float32) / np.float32(255)
+    crack = photo.truth[..., 1] > 0
+    for seed in range(20):
+        faded = _faded(rgb, kept, np.random.default_rng(seed))
+        assert (faded[kept == 1.0] == rgb[kept == 1.0]).all()
+        dark = 1.0 - faded[crack].mean() / rgb[kept == 1.0].mean()
+        assert 0.3 < dark < 0.77  # .83 before
 
 
 def test_what_drowns_in_the_texture_is_neither_crack_nor_none() -> None:
