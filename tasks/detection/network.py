@@ -17,6 +17,7 @@ from numba import njit
 
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
+from tasks.detection.heap import reused
 from tasks.detection.sauvola import Mask
 from tasks.detection.windows import Window, whole_of, windows
 
@@ -103,17 +104,18 @@ def probabilities(
     net = _read(model)
     image = whole_of(raster)
     done_px = 0
-    for window, wider in _windows(net, raster, image, OCTAVES if model.at_smaller_sizes else (), model):
-        valid = raster.valid(*window)
-        if valid.any():
-            logit = _answer(net, raster, window, 0, model).at(window)
-            if wider:
-                quarter, half = (answer.at(window) for answer in wider)
-                _heed(logit, half, quarter)
-            yield window, _of_logits(logit, valid)
-        done_px += window.area_px
-        if on_progress is not None:
-            on_progress(done_px / image.area_px)
+    with reused():
+        for window, wider in _windows(net, raster, image, OCTAVES if model.at_smaller_sizes else (), model):
+            valid = raster.valid(*window)
+            if valid.any():
+                logit = _answer(net, raster, window, 0, model).at(window)
+                if wider:
+                    quarter, half = (answer.at(window) for answer in wider)
+                    _heed(logit, half, quarter)
+                yield window, _of_logits(logit, valid)
+            done_px += window.area_px
+            if on_progress is not None:
+                on_progress(done_px / image.area_px)
 
 
 def _windows(
