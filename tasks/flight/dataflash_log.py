@@ -9,16 +9,19 @@ from tasks.flight.mavlink_messages import vehicle_name
 from tasks.flight.recording import Fix, Recording, Trigger
 
 READ = ["POS", "GPS", "ATT", "CAM", "TRIG", "EV", "ARM", "MSG"]
+FIRST = 0  # instance, of whatever a vehicle may have several
 ARMED, DISARMED = 10, 11  # of EV
 
 
 def read_dataflash_log(path: Path) -> Recording:
-    """Positions from POS (the filter's), else from GPS; triggers from CAM, else from TRIG."""
+    """Positions from POS (the filter's), else from GPS; triggers from CAM, else from TRIG. Of several
+    receivers or cameras the first."""
     log = DFReader.DFReader_binary(str(path))
     try:
         messages = []
         while (message := log.recv_match(type=READ)) is not None:
-            messages.append(message)
+            if getattr(message, "I", FIRST) == FIRST:
+                messages.append(message)
     finally:
         log.close()
     kinds = {message.get_type() for message in messages}
