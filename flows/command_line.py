@@ -19,6 +19,7 @@ app = cyclopts.App(
     "millimetres out. Every path may be relative; lengths are metres and millimetres as their names say.",
     version="0.1.0",
     usage="Usage: hairline COMMAND [OPTIONS]",
+    suppress_keyboard_interrupt=False,  # main() says what is kept
 )
 Out = Annotated[Path | None, Parameter(name="--out")]
 
@@ -132,7 +133,6 @@ def main() -> None:
     os.environ.setdefault("PREFECT_LOGGING_LEVEL", "CRITICAL")
     os.environ.setdefault("PREFECT_SERVER_LOGGING_LEVEL", "CRITICAL")  # it logs tracebacks when it is stopped
     os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
-    os.environ.setdefault("PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS", "120")  # 20 may be too few
     os.environ.setdefault("DO_NOT_TRACK", "1")
     add_commands()
 

@@ -1,31 +1,33 @@
 """Running flows from the command line, with a Prefect server where one answers, else without."""
 
 import contextlib
-import os
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-import httpx
-
 from flows.command_line import EXIT_WAITING_FOR_FLIGHT
 from flows.console import StageLines, out
+from flows.own_server import answers, own_server
 from schemas.crack_report import CrackReport
 
 SERVER = "http://127.0.0.1:4200/api"
 
 
-def use_server_that_answers() -> None:
-    """Set PREFECT_API_URL to a server that answers; else unset it, which makes Prefect start its own."""
-    configured = os.environ.get("PREFECT_API_URL")
-    for url in filter(None, (configured, SERVER)):
-        with contextlib.suppress(httpx.HTTPError):
-            if httpx.get(f"{url}/health", timeout=2.0).status_code == 200:
-                os.environ["PREFECT_API_URL"] = url
-                return
-    if configured:
-        out.print(f"No Prefect server answers at {configured}; going on without a dashboard.")
-    os.environ.pop("PREFECT_API_URL", None)
+@contextlib.contextmanager
+def server() -> Iterator[None]:
+    """Prefect talks to the configured server, or to that of `hairline serve`, or where none answers to one of
+    its own."""
+    from prefect.settings import PREFECT_API_URL, temporary_settings
+
+    configured = PREFECT_API_URL.value()
+    with contextlib.ExitStack() as opened:
+        url = next(filter(answers, filter(None, (configured, SERVER))), None)
+        if url is None:
+            if configured:
+                out.print(f"No Prefect server answers at {configured}; going on without a dashboard.")
+            url = opened.enter_context(own_server())
+        opened.enter_context(temporary_settings({PREFECT_API_URL: url}))
+        yield
 
 
 @contextlib.contextmanager
@@ -63,8 +65,7 @@ def run_flow(
         with run.running(run.Run(listener=all_cached, dry=True)):
             report = inspect_bridge.fn(inspection, out, redo, photos, logs)
     except (NotAllCached, NotYetKnown):
-        use_server_that_answers()
-        with listening():
+        with server(), listening():
             return inspect_bridge(inspection, out, redo, photos, logs)
     with StageLines() as lines:
         for event in events:

@@ -10,9 +10,8 @@ import time
 from pathlib import Path
 from typing import cast
 
-import httpx
-
 from flows.console import out
+from flows.own_server import answers
 from schemas.problem import BadInput
 
 
@@ -22,7 +21,7 @@ def serve_everything(port: int, report_port: int) -> int:
     os.environ["PREFECT_LOGGING_LEVEL"] = "INFO"  # the dashboard shows the log of each run
     os.environ["HAIRLINE_REPORT_URL"] = f"http://127.0.0.1:{report_port}"
     host = host_reports(Path("runs"), report_port)
-    server = None if _answers(url) else _start_server(port, url)
+    server = None if answers(url) else _start_server(port, url)
     try:
         out.print(f"Dashboard: http://127.0.0.1:{port}   Reports: http://127.0.0.1:{report_port}")
         serve_deployments()
@@ -69,13 +68,6 @@ class _QuietHandler(http.server.SimpleHTTPRequestHandler):
         pass
 
 
-def _answers(url: str) -> bool:
-    try:
-        return httpx.get(f"{url}/health", timeout=2.0).status_code == 200
-    except httpx.HTTPError:
-        return False
-
-
 def _start_server(port: int, url: str) -> "subprocess.Popen[bytes]":
     out.print("Starting the Prefect server …")
     environment = os.environ | {"PREFECT_UI_API_URL": url}
@@ -86,7 +78,7 @@ def _start_server(port: int, url: str) -> "subprocess.Popen[bytes]":
         stdout=subprocess.DEVNULL,
     )
     for _ in range(240):
-        if _answers(url):
+        if answers(url):
             return server
         if server.poll() is not None:
             break

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,18 +32,57 @@ def _cracks(folder: Path) -> bytes:
 
 
 def _kill_in(stage: str, cwd: Path) -> None:
-    """SIGKILL, to its server too, as soon as the line says that the stage has started."""
-    with subprocess.Popen(
+    """SIGKILL as soon as the line says that the stage has started; its server ends with it."""
+    with _running(cwd) as process:
+        _wait_for(stage, process)
+        servers = _servers_of(process.pid)
+        process.kill()
+    assert servers
+    _wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in servers))
+
+
+@pytest.mark.slow
+def test_ctrl_c_says_in_one_line_that_nothing_is_lost(tmp_path: Path) -> None:
+    """A terminal interrupts every process of the command at once."""
+    write_inspection(tmp_path / "site", photos=2)
+    with _running(tmp_path) as process:
+        _wait_for("detect", process)
+        servers = _servers_of(process.pid)
+        os.killpg(process.pid, signal.SIGINT)
+        said, _ = process.communicate(timeout=120)
+    assert process.returncode == 130, said
+    assert said.splitlines()[-1].startswith("Interrupted: finished stages are kept"), said
+    assert "Error" not in said and "Traceback" not in said, said
+    assert servers and not any(Path(f"/proc/{pid}").exists() for pid in servers)
+
+
+def _running(cwd: Path) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
         [str(HAIRLINE), *RUN],
         cwd=cwd,
         env=environment(cwd, PYTHONUNBUFFERED="1"),
         stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,
-    ) as process:
-        assert process.stdout is not None
-        deadline_s = time.monotonic() + 240
-        for line in process.stdout:
-            if line.strip() == f"… {stage}" or time.monotonic() > deadline_s:
-                break
-        os.killpg(process.pid, signal.SIGKILL)
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
+    )
+
+
+def _wait_for(stage: str, process: "subprocess.Popen[str]") -> None:
+    assert process.stdout is not None
+    deadline_s = time.monotonic() + 240
+    for line in process.stdout:
+        if line.strip() == f"… {stage}" or time.monotonic() > deadline_s:
+            return
+
+
+def _servers_of(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def _wait_until(true: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 60
+    while not true():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.2)
