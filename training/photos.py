@@ -15,6 +15,7 @@ ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on
 DRAWN = 0.1  # share of the crops of photos on which further cracks are drawn: real surfaces, known cracks
 LENT = 0.25  # share of all crops on which the cracks of another photo are laid
 FADED = 0.25  # share of all crops whose cracks are made fainter
+DAPPLED = 0.15  # share of all crops on which leaves and branches throw their shadows
 LENT_SCALES = (0.5, 6.0)  # seen from near they are wide, and the surface still sharp
 AROUND_PX = 41  # the surface beside a crack is told from this far around it
 FOLDS = 5
@@ -166,6 +167,24 @@ def _softened(rgb: Pixels, at: tuple[float, float], scale: float) -> Pixels:
     return soft
 
 
+def _dappled(rgb: Floats, rng: Rng) -> Floats:
+    """Under ragged, drawn-out shadows: darker and bluer, for the sky shines there, and as sharp as in the sun."""
+    wide = 2 * SIDE_PX  # to turn and stretch
+    size_px = float(np.exp(rng.uniform(np.log(8.0), np.log(50.0))))
+    leaves = np.zeros((wide, wide), np.float32)
+    for octave in range(4):
+        noise = cv2.GaussianBlur(rng.standard_normal((wide, wide), np.float32), (0, 0), size_px / 2**octave)
+        leaves += noise / noise.std() / np.float32(1.5**octave)
+    turn = cv2.getRotationMatrix2D((wide / 2, wide / 2), float(rng.uniform(0, 360)), 1.0)
+    turn[:, :2] = turn[:, :2] @ np.diag([float(rng.uniform(0.25, 1.0)), 1.0])
+    turn[:, 2] = SIDE_PX / 2 - turn[:, :2] @ np.full(2, wide / 2)
+    leaves = cv2.warpAffine(leaves, turn, (SIDE_PX, SIDE_PX), borderMode=cv2.BORDER_REFLECT_101)
+    shadow = (leaves > np.quantile(leaves, rng.uniform(0.7, 0.97))).astype(np.float32)
+    shadow = cv2.GaussianBlur(shadow, (0, 0), float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))))
+    kept = float(rng.uniform(0.25, 0.7)) * np.array([0.95, 1.0, rng.uniform(1.0, 1.3)], np.float32)
+    return np.asarray(rgb * (1.0 - shadow[..., None] * (1.0 - kept)), np.float32)
+
+
 def _relit(rgb: Floats, rng: Rng) -> Floats:
     """Another camera, another light."""
     if rng.random() < 0.3:
@@ -175,6 +194,8 @@ def _relit(rgb: Floats, rng: Rng) -> Floats:
         edge = np.exp(rng.uniform(np.log(0.002), np.log(0.5)))
         shade = rng.uniform(0.1, 0.65) / (1.0 + np.exp(np.clip(across / edge, -40, 40)))
         rgb = rgb * (1.0 - shade).astype(np.float32)[..., None]
+    if rng.random() < DAPPLED:
+        rgb = _dappled(rgb, rng)
     gain = np.exp(rng.normal(0.0, 0.3) + rng.normal(0.0, 0.06, 3)).astype(np.float32)
     rgb = np.clip(rgb * gain, np.float32(1e-3), np.float32(1.0)) ** np.float32(np.exp(rng.normal(0.0, 0.25)))
     grey = rgb @ np.full((3, 1), 1 / 3, np.float32)
