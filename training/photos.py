@@ -168,7 +168,7 @@ def _softened(rgb: Pixels, at: tuple[float, float], scale: float) -> Pixels:
 
 
 def _dappled(rgb: Floats, rng: Rng) -> Floats:
-    """Under ragged, drawn-out shadows: darker and bluer, for the sky shines there, and as sharp as in the sun."""
+    """Under ragged, drawn-out shadows: darker and bluer, for the sky shines there, sharp as in the sun."""
     wide = 2 * SIDE_PX  # to turn and stretch
     size_px = float(np.exp(rng.uniform(np.log(8.0), np.log(50.0))))
     leaves = np.zeros((wide, wide), np.float32)

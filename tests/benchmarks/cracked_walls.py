@@ -44,10 +44,12 @@ def cracked_wall(
     *,
     shade: float = 1.0,
     marker: bool = False,
+    leaves: bool = False,
     least_px: float = 2.0,
 ) -> Wall:
     """depth_rms: how much darker the crack is than the wall, in RMS of the wall's texture.
-    shade: brightness of one half of the wall against the other, with a hard edge between."""
+    shade: brightness of one half of the wall against the other, with a hard edge between. leaves: their shadows
+    lie on a fifth of it."""
     rng = np.random.default_rng([seed, 0x77616C6C])
     side_m = SIDE_PX * PX_M
     face = Face("wall", (-side_m / 2, 0.0, -side_m / 2), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), side_m, side_m)
@@ -70,6 +72,12 @@ def cracked_wall(
     tilt = np.radians(rng.uniform(-70, 70))
     across = (x - side_m / 2) * np.cos(tilt) + (y - side_m / 2) * np.sin(tilt)
     light = LightMap(np.where(across > 0, shade, 1.0).astype(np.float32), side_m / 511)
+    if leaves:
+        ragged = power_law(
+            np.random.default_rng([seed, 0x6C656166]), (512, 512), side_m / 511, 1.0, stretch=3.0
+        )
+        in_shadow = (ragged > np.quantile(ragged, 0.8)).astype(np.float32)
+        light = LightMap(1.0 - 0.6 * cv2.GaussianBlur(in_shadow, (0, 0), 1.0), side_m / 511)
     camera = Camera(width_px=SIDE_PX, height_px=SIDE_PX, focal_px=FOCAL_PX)
     pose = CameraPose(position_m=(0.0, -FOCAL_PX * PX_M, 0.0), yaw_deg=0.0, pitch_deg=0.0)
     still = Motion(np.zeros(3), np.zeros(3))

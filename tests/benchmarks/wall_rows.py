@@ -70,10 +70,11 @@ def over_width_and_depth() -> Iterator[Row]:
 
 
 def uneven_light() -> Iterator[Row]:
-    """F1 of pixels at 2 px with and without a shadow of 40 %; what is found along its edge; a marker."""
+    """F1 of pixels at 2 px with and without a shadow of 40 %; what is found along its edge; a marker; shadows
+    of leaves."""
     for method in METHODS:
-        even, shaded, marked = [], [], []
-        along_edge_px = 0
+        even, shaded, marked, dappled = [], [], [], []
+        along_edge_px = of_leaves_px = 0
         for seed in SEEDS:
             wall = cracked_wall(seed, 3.0, 8.0)
             even.append(count(found_on(wall.rgb, method, GSD_MM_PX), wall.truth, 2))
@@ -85,13 +86,19 @@ def uneven_light() -> Iterator[Row]:
             painted = cracked_wall(seed, 3.0, 8.0, marker=True)
             valid = ~remove(ArrayRaster(painted.rgb), None, PatternSettings()).masked.whole()
             marked.append(count(found_on(painted.rgb, method, GSD_MM_PX, valid), painted.truth & valid, 2))
-        f1 = [scores(_summed(counts)).f1 for counts in (even, shaded, marked)]
+            leafy = cracked_wall(seed, 3.0, 8.0, leaves=True)
+            found = found_on(leafy.rgb, method, GSD_MM_PX)
+            dappled.append(count(found, leafy.truth, 2))
+            of_leaves_px += int((centreline(found) & far).sum())
+        f1 = [scores(_summed(counts)).f1 for counts in (even, shaded, marked, dappled)]
         bar = "≤ 0.02" if method == "hairline" else None
         data, seed_text = f"{len(SEEDS)} simulated walls, crack of 3 px", f"{SEEDS[0]}…"
         yield row(
             f"F1 lost to a shadow, one half at 40 %: {method}", f1[0] - f1[1], "1", bar, data, seed_text
         )
         yield row(f"F1 lost to a marker on the crack: {method}", f1[0] - f1[2], "1", bar, data, seed_text)
+        yield row(f"F1 lost to shadows of leaves: {method}", f1[0] - f1[3], "1", None, data, seed_text)
+        yield row(f"found of shadows of leaves: {method}", of_leaves_px, "px", None, data, seed_text)
         edge_bar = "≤ 0" if method == "hairline" else None
         yield row(f"found along the shadow's edge: {method}", along_edge_px, "px", edge_bar, data, seed_text)
 
