@@ -48,8 +48,8 @@ def cracked_wall(
     least_px: float = 2.0,
 ) -> Wall:
     """depth_rms: how much darker the crack is than the wall, in RMS of the wall's texture.
-    shade: brightness of one half of the wall against the other, with a hard edge between. leaves: their shadows
-    lie on a fifth of it."""
+    shade: brightness of one half of the wall against the other, with a hard edge between. leaves: their
+    shadows lie on a fifth of it."""
     rng = np.random.default_rng([seed, 0x77616C6C])
     side_m = SIDE_PX * PX_M
     face = Face("wall", (-side_m / 2, 0.0, -side_m / 2), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), side_m, side_m)
