@@ -2,13 +2,14 @@
 
 PHOTOS holds images/, masks/ and groups.txt, SURFACES what training.surfaces wrote. With --fold the photos of
 that fold (by group) are left out and judged along the way; without, all take part. Of each batch two thirds
-are photos, the rest surfaces. One thread and a seed: the same result on the same machine. The rate stays as
-it is, and the weights of every few thousand steps are kept, for training.average to take the mean of
-(Izmailov et al. 2018). --start goes on from weights that an earlier call wrote.
+are photos, the rest surfaces. One thread and a seed: the same result on the same machine. --start goes on
+from weights that an earlier call wrote: then the rate does not fall, and the weights of every few thousand steps
+are kept for training.average to take the mean of (Izmailov et al. 2018).
 """
 
 import argparse
 import copy
+import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -26,7 +27,7 @@ BATCH = 6  # two of three are photos, the others surfaces
 RATE, WARM_UP, DECAY = 3e-3, 300, 1e-3
 AVERAGED = 0.999  # weights are averaged over about 1 / (1 − AVERAGED) steps: these are judged and kept
 EVERY = 1000  # steps between reports
-KEPT = 3  # of so many reports the weights of one are kept, and judged
+KEPT = 3  # of so many reports the weights of one are judged, and kept
 
 
 def loss_of(logit: Tensor, truth: Tensor) -> Tensor:
@@ -110,7 +111,8 @@ def main() -> None:
         for step in range(1, args.steps + 1):
             rgb, truth = coming.result()
             coming = ahead.submit(batch, photos, surfaces, (args.seed << 32) + step)
-            rate = args.rate * min(1.0, step / WARM_UP)
+            falling = 1.0 if args.start else 0.5 + 0.5 * math.cos(math.pi * step / args.steps)
+            rate = args.rate * min(step / WARM_UP, falling)
             for group in optimiser.param_groups:
                 group["lr"] = rate
             loss = loss_of(net(rgb.contiguous(memory_format=torch.channels_last)), truth)
@@ -124,10 +126,12 @@ def main() -> None:
                     if mine.dtype.is_floating_point:
                         mine.mul_(keep).add_(new, alpha=1.0 - keep)
             if step % EVERY == 0 or step == args.steps:
+                torch.save(averaged.state_dict(), args.out / "weights.pt")
                 minutes, held_out = (time.monotonic() - began) / 60, ""
-                if step % (KEPT * EVERY) == 0 or step == args.steps:
-                    torch.save(averaged.state_dict(), args.out / f"{step:06d}.pt")
+                if step % (KEPT * EVERY) == 0:
                     held_out = judged(averaged, held) if held else ""
+                    if args.start:
+                        torch.save(averaged.state_dict(), args.out / f"{step:06d}.pt")
                 print(f"{step} {minutes:.1f} min, loss {total / EVERY:.4f} {held_out}", flush=True)
                 total = 0.0
 
