@@ -3,8 +3,8 @@
 PHOTOS holds images/, masks/ and groups.txt, SURFACES what training.surfaces wrote. With --fold the photos of
 that fold (by group) are left out and judged along the way; without, all take part. Of each batch two thirds
 are photos, the rest surfaces. One thread and a seed: the same result on the same machine. --start goes on
-from weights that an earlier call wrote: then the rate does not fall, and the weights of every few thousand steps
-are kept for training.average to take the mean of (Izmailov et al. 2018).
+from weights that an earlier call wrote: the rate does not fall then, and the weights of every few thousand
+steps are kept for training.average to take the mean of (Izmailov et al. 2018).
 """
 
 import argparse
