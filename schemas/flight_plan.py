@@ -68,6 +68,7 @@ class FlightPlan(Contract):
     fence_m: tuple[Vector2, ...] | None = None  # corners [e, n] that the flights stay inside of
     no_fly_m: tuple[Box, ...] = ()  # that they stay outside of
     flights: tuple[Flight, ...] = ()  # in order; none: a plan of one flight
+    return_height_m: float | None = None  # RTL_ALT: a failsafe's way home is known air; None: at no height
     left_out: tuple[LeftOut, ...] = ()
 
     @property
@@ -85,6 +86,19 @@ class FlightPlan(Contract):
                 }
             )
             for flight in self.flights
+        )
+
+    @property
+    def way_home(self) -> str:
+        """What a failsafe may do, in words."""
+        if self.return_height_m is None:
+            return (
+                "no height is known at which a failsafe can come straight home: let it land, or fly back the"
+                " way it came (SmartRTL)"
+            )
+        return (
+            f"a failsafe comes home through known air with RTL_ALT at {self.return_height_m:g} m"
+            f" ({100 * self.return_height_m:.0f} cm): set it before take-off"
         )
 
     @property

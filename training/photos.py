@@ -178,9 +178,9 @@ def _dappled(rgb: Floats, rng: Rng) -> Floats:
     turn = cv2.getRotationMatrix2D((wide / 2, wide / 2), float(rng.uniform(0, 360)), 1.0)
     turn[:, :2] = turn[:, :2] @ np.diag([float(rng.uniform(0.25, 1.0)), 1.0])
     turn[:, 2] = SIDE_PX / 2 - turn[:, :2] @ np.full(2, wide / 2)
-    leaves = cv2.warpAffine(leaves, turn, (SIDE_PX, SIDE_PX), borderMode=cv2.BORDER_REFLECT_101)
-    shadow = (leaves > np.quantile(leaves, rng.uniform(0.7, 0.97))).astype(np.float32)
-    shadow = cv2.GaussianBlur(shadow, (0, 0), float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))))
+    turned = cv2.warpAffine(leaves, turn, (SIDE_PX, SIDE_PX), borderMode=cv2.BORDER_REFLECT_101)
+    sharp = (turned > np.quantile(turned, rng.uniform(0.7, 0.97))).astype(np.float32)
+    shadow = cv2.GaussianBlur(sharp, (0, 0), float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))))
     kept = float(rng.uniform(0.25, 0.7)) * np.array([0.95, 1.0, rng.uniform(1.0, 1.3)], np.float32)
     return np.asarray(rgb * (1.0 - shadow[..., None] * (1.0 - kept)), np.float32)
 

@@ -33,6 +33,7 @@ from tasks.planning.stated_places import in_the_model
 from tasks.planning.timing import duration_s, path_length_m
 from tasks.planning.tour import to_and_fro
 from tasks.planning.viewpoints import View, Views, shooting_grid, shooting_points, widened_overlap
+from tasks.planning.way_home import return_height_m
 
 Array = npt.NDArray[np.float64]
 
@@ -155,6 +156,7 @@ def plan_and_prove(
         fence_m=settings.fence_m,
         no_fly_m=settings.no_fly_m,
         flights=tuple(flown),
+        return_height_m=return_height_m(waypoints, flown, base.home_m, base.top_m, airspace),
         left_out=left_out(coverage),
     )
     return made, tuple(proof.widths for proof in proofs)
