@@ -8,6 +8,7 @@ from schemas.file import File
 from schemas.geodesy import GeoOrigin, KnownPoint, anchored
 from schemas.obstacle import Obstacle
 from schemas.problem import BadInput, LeftOut
+from schemas.scan_window import ScanWindow
 from schemas.surface import Surface
 from schemas.utm import UtmZone, utm_origin
 
@@ -21,6 +22,7 @@ class Structure(Contract):
     min_m: Vector3  # extent of the scanned world
     max_m: Vector3
     stations_m: tuple[Vector3, ...] = ()  # where scanners stood; none where that is not known
+    windows: tuple[ScanWindow, ...] = ()  # of each of these, where it looked; none where that is not known
     world_origin_m: Vector3 = (0.0, 0.0, 0.0)  # all places here + this = world (UTM or another large grid)
     utm_zone: UtmZone | None = None  # of that world, where it is known
     left_out: tuple[LeftOut, ...] = ()

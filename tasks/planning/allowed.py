@@ -97,7 +97,9 @@ def allowed_region(
     voxel_m = max(settings.voxel_m, float(np.cbrt(extent.prod() / MOST_CELLS)))
     nx, ny, nz = (int(n) + 1 for n in np.ceil(extent / voxel_m))
     shape = nx, ny, nz
-    known = seen_free(low_m, voxel_m, shape, points_m, structure.stations_m, settings.scanner_reach_m)
+    known = seen_free(
+        low_m, voxel_m, shape, points_m, structure.stations_m, settings.scanner_reach_m, structure.windows
+    )
     known = ~ndimage.binary_opening(~known, SPECK)
     axes = [low_m[k] + np.arange(shape[k]) * voxel_m for k in range(3)]
     for box in settings.free_m:

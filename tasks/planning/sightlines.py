@@ -1,8 +1,9 @@
 """Which air the scanners have seen to be free.
 
 A place is known to be free where a scanner's line to it meets nothing that was scanned. A direction without
-an echo (the sky) says so much less: it counts to `reach_m` and no farther. Laser scanners miss wires, glass
-and what is black and wet; the clearance is no help against these, a look on site is.
+an echo (the sky) says so much less: it counts to `reach_m` and no farther, and nothing where the scanner did
+not look. Laser scanners miss wires, glass and what is black and wet; the clearance is no help against these,
+a look on site is.
 """
 
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from numba import njit
 
 from schemas.contract import Vector3
+from schemas.scan_window import ScanWindow
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -24,17 +26,28 @@ WIDEST_PX = 24  # a point closer than this makes it is the scanner's own tripod
 
 def seen_free(
     places_low_m: Array, voxel_m: float, shape: tuple[int, int, int],
-    points_m: Array, stations_m: Sequence[Vector3], reach_m: float,
+    points_m: Array, stations_m: Sequence[Vector3], reach_m: float, windows: Sequence[ScanWindow] = (),
 ) -> Flags:  # fmt: skip
     """(nx, ny, nz) of a grid whose first centre is at places_low_m: whether any scanner saw that place.
 
-    points_m: (N, 3) everything scanned, by whichever scanner."""
+    points_m: (N, 3) everything scanned, by whichever scanner. windows: where each looked; none: all round."""
     seen = np.zeros(shape, dtype=np.bool_)
-    for station in stations_m:
+    for station, window in zip(stations_m, windows or [ScanWindow()] * len(stations_m), strict=True):
         eye = np.asarray(station, dtype=np.float64)
         depth = _cube_map(np.ascontiguousarray(points_m - eye))
-        _look(seen, np.asarray(places_low_m - eye, dtype=np.float64), voxel_m, depth, reach_m)
+        low = np.asarray(places_low_m - eye, dtype=np.float64)
+        slopes = np.sin(np.radians([window.lowest_deg, window.highest_deg]))
+        _look(seen, low, voxel_m, depth, reach_m, _looked_at(window), slopes[0], slopes[1])
     return seen
+
+
+def _looked_at(window: ScanWindow) -> Flags:
+    """(360,) of each degree of azimuth, counter-clockwise from east."""
+    azimuth = np.arange(360) + 0.5
+    looked = np.ones(360, dtype=np.bool_)
+    for start, end in window.blind_deg:
+        looked &= (azimuth - start) % 360 > (end - start) % 360
+    return looked
 
 
 @njit(cache=True)
@@ -71,16 +84,20 @@ def _cube_map(rays):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _look(seen, low, voxel_m, depth, reach_m):  # type: ignore[no-untyped-def]
+def _look(seen, low, voxel_m, depth, reach_m, looked, lowest, highest):  # type: ignore[no-untyped-def]
     half = FACE_PX / 2
     for i in range(seen.shape[0]):
         x = low[0] + i * voxel_m
         for j in range(seen.shape[1]):
             y = low[1] + j * voxel_m
+            column_looked = looked[int(np.degrees(np.arctan2(y, x)) % 360.0) % 360]
             for k in range(seen.shape[2]):
                 if seen[i, j, k]:
                     continue
                 z = low[2] + k * voxel_m
+                distance = np.sqrt(x * x + y * y + z * z)
+                if not (column_looked and lowest * distance <= z <= highest * distance):
+                    continue
                 if abs(x) >= abs(y) and abs(x) >= abs(z):
                     face = 0 if x > 0 else 1
                 elif abs(y) >= abs(z):
@@ -92,5 +109,4 @@ def _look(seen, low, voxel_m, depth, reach_m):  # type: ignore[no-untyped-def]
                 column = int(half + half * a / along / REACH_OF_FACE)
                 row = int(half + half * b / along / REACH_OF_FACE)
                 first = depth[face, row, column]
-                distance = np.sqrt(x * x + y * y + z * z)
                 seen[i, j, k] = distance < first if first < np.inf else distance <= reach_m

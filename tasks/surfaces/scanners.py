@@ -1,8 +1,13 @@
-"""Which stated scanner positions can be believed: a scanner sees no two surfaces in one direction."""
+"""Which stated scanner positions can be believed, and where a scanner looked.
+
+A scanner sees no two surfaces in one direction. Where it has no echo it may have seen the sky, or not have
+looked: many scans are of a window alone, and none sees through its own tripod.
+"""
 
 import numpy as np
 import numpy.typing as npt
 
+from schemas.scan_window import ScanWindow
 from tasks.surfaces.cloud import Cloud, unit
 
 Floats = npt.NDArray[np.float64]
@@ -12,20 +17,39 @@ DEEPER = 1.15  # farther than the nearest point of its direction by this factor,
 LEAST_M = 0.3  # flat ground seen at a grazing angle is not
 OF_ONE_VIEW = 1e-12  # views are computed alike; normals, which stand for views not known, are never so near
 MOST_HIDDEN = 0.05  # of a station's own points: edges and leaves make up to 2 %, false places 9 % and more
+WIDEST_GAP_DEG = 15  # without any echo: water, glass or a road to the horizon; wider, nobody looked
 
 
-def scanners(cloud: Cloud, scanners_m: Floats) -> Floats:
-    """(K, 3) of the scanners (S, 3), NaN where not known, those from which their points can have been seen.
+def scanners(cloud: Cloud, scanners_m: Floats) -> tuple[Floats, tuple[ScanWindow, ...]]:
+    """(K, 3) of the scanners (S, 3), NaN where not known, those from which their points can have been seen;
+    and where each looked.
 
     The origin of a cloud that was merged elsewhere, or that moved while it scanned, is no scanner's place.
     What was free can only be told from a true one."""
-    believed = []
+    believed, windows = [], []
     for station in scanners_m[~np.isnan(scanners_m).any(axis=1)]:
         towards = unit(station - cloud.points)
         own = np.einsum("ni,ni->n", towards, cloud.views) > 1 - OF_ONE_VIEW
         if own.any() and hidden_share(cloud.points[own] - station) <= MOST_HIDDEN:
             believed.append(station)
-    return np.array(believed).reshape(-1, 3)
+            windows.append(window(cloud.points[own] - station))
+    return np.array(believed).reshape(-1, 3), tuple(windows)
+
+
+def window(rays_m: Floats) -> ScanWindow:
+    """Where a scanner with (N, 3) echoes looked: not where a wide sector has no echo at all, be it low or
+    high, nor lower than its lowest echo. One that saw less than half the circle was aimed, and looked no
+    higher than its highest echo; any other saw the sky."""
+    east, north, up = rays_m.T
+    seen = np.unique(np.floor(np.degrees(np.arctan2(north, east)) % 360.0).astype(np.int64) % 360)
+    gaps = np.diff(seen, append=seen[0] + 360) - 1
+    wide = gaps > WIDEST_GAP_DEG
+    blind = tuple(
+        (float(a + 1) % 360, float(a + 1 + gap) % 360) for a, gap in zip(seen[wide], gaps[wide], strict=True)
+    )
+    elevation = np.degrees(np.arctan2(up, np.hypot(east, north)))
+    highest = float(elevation.max()) if gaps[wide].sum() > 180 else 90.0
+    return ScanWindow(blind_deg=blind, lowest_deg=float(elevation.min()), highest_deg=highest)
 
 
 def hidden_share(rays_m: Floats) -> float:

@@ -57,6 +57,7 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
     item = "model of " + ", ".join(station.name for station in model.stations)
     cloud = read_cloud(shelf.path(model.cloud), item, scanners_m)
     extraction = extract_structure(cloud, settings, item, progress)
+    stations_m, windows = scanners(cloud, scanners_m)
     with shelf.scratch() as folder:
         write_points(folder / "occupied.ply", extraction.occupied_m)
         occupied = shelf.put(folder / "occupied.ply")
@@ -66,7 +67,8 @@ def extract(model: RegisteredModel, settings: SurfaceSettings) -> Structure:
         occupied=occupied,
         min_m=_triple(cloud.points.min(axis=0)),
         max_m=_triple(cloud.points.max(axis=0)),
-        stations_m=tuple(_triple(place_m) for place_m in scanners(cloud, scanners_m)),
+        stations_m=tuple(_triple(place_m) for place_m in stations_m),
+        windows=windows,
         world_origin_m=model.origin_m,
         utm_zone=model.utm_zone,
         left_out=model.left_out,

@@ -5,6 +5,7 @@ import pytest
 
 from schemas.box import Box
 from schemas.problem import BadInput
+from schemas.scan_window import ScanWindow
 from schemas.settings import PlanSettings
 from tasks.planning.airspace import Airspace
 from tasks.planning.allowed import Allowed, Block, allowed_region
@@ -65,6 +66,18 @@ def test_without_an_echo_air_is_known_to_the_scanners_reach_and_no_farther() -> 
     near = blocks(region(scanner_reach_m=8.0), [(0.0, -10.0, 8.0)])
     assert near == [Block.FREE]
     assert blocks(region(scanner_reach_m=5.0), [(0.0, -10.0, 8.0)]) == [Block.UNKNOWN]
+
+
+def test_where_a_scanner_did_not_look_no_air_is_known() -> None:
+    """It sees the wall from west-northwest to east-northeast, from 20° below level to 40° above it."""
+    window = ScanWindow(blind_deg=((160.0, 20.0),), lowest_deg=-20.0, highest_deg=40.0)
+    structure = screened().structure.model_copy(update={"stations_m": (STATION,), "windows": (window,)})
+    allowed = allowed_region(structure, screened().cloud, PlanSettings(), MARGIN_M, LOW, HIGH)
+    before, behind, beside = (0.0, -6.5, 2.0), (0.0, -13.0, 4.0), (-12.0, -10.0, 4.0)
+    above, below = (0.0, -8.0, 6.0), (0.0, -8.0, -0.4)
+    assert blocks(allowed, [before, behind, beside, above]) == [Block.FREE, *[Block.UNKNOWN] * 3]
+    assert allowed.slack_m(np.array([below])) < 0
+    assert blocks(region(), [behind, beside, above]) == [Block.FREE] * 3
 
 
 def test_the_crew_can_vouch_for_air_that_nobody_scanned() -> None:

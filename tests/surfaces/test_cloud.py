@@ -55,7 +55,7 @@ def test_a_known_scanner_counts_beside_one_that_is_not_known(tmp_path: Path) -> 
     cloud = read_cloud(path, "a", scanners_m)
     assert not cloud.sides_known
     np.testing.assert_array_equal(np.sign(cloud.views[:, 2]), np.sign(cloud.normals[:, 2]))
-    np.testing.assert_array_equal(scanners(cloud, scanners_m), STATIONS_M[:1])
+    np.testing.assert_array_equal(scanners(cloud, scanners_m)[0], STATIONS_M[:1])
 
 
 def test_normals_are_estimated_where_the_file_has_none(tmp_path: Path) -> None:
