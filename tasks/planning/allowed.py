@@ -62,6 +62,23 @@ class Allowed:
         slack = self._distance_m[tuple(index.T)].astype(np.float64) - self._short_m
         return np.asarray(np.where(inside, slack, -self._short_m))
 
+    def on_the_climb(self, foot_m: Array, top_m: Array, seen_from_m: float) -> Block:
+        """What an upright climb, (3,) to (3,), would enter: what is stated as closed, margin included, or,
+        above the height seen_from_m, air that is not known. FREE where it enters neither."""
+        (i, j, first), (_, _, last) = self._cells(np.stack([foot_m, top_m]))[0]
+        reach = int(np.ceil(self._short_m / self.voxel_m))
+        ring, levels = np.arange(-reach, reach + 1), np.arange(first, last + 1)
+        rows, columns = (np.clip(at + ring, 0, n - 1) for at, n in zip((i, j), self.why.shape, strict=False))
+        beside = np.hypot(ring[:, None], ring) * self.voxel_m <= self._short_m
+        passed = self.why[np.ix_(rows, columns, levels)][beside]
+        for closed in (Block.NO_FLY, Block.FENCE):
+            if (passed == closed).any():
+                return closed
+        unknown = (self.why[i, j, levels] == Block.UNKNOWN) & (
+            self.low_m[2] + levels * self.voxel_m > seen_from_m
+        )
+        return Block.UNKNOWN if unknown.any() else Block.FREE
+
     def reasons(self, places_m: Array) -> npt.NDArray[np.int64]:
         """(M,) Block of what is not allowed near each place without slack, FREE for those with."""
         reasons = np.full(len(places_m), int(Block.FREE))

@@ -12,9 +12,10 @@ from scipy.spatial import cKDTree
 from schemas.contract import Vector3
 from schemas.problem import BadInput
 from tasks.planning.airspace import Airspace
+from tasks.planning.allowed import Block
 from tasks.planning.astar import Cell
 from tasks.planning.occupancy import REACH, VoxelGrid
-from tasks.planning.refusals import no_way
+from tasks.planning.refusals import no_way, no_way_up
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -88,14 +89,22 @@ def take_off_place(home_m: Vector3, airspace: Airspace) -> Vector3:
     rise = airspace.points_m[near, 2] - z
     in_the_way = rise[rise > ROUGH_M + STEEP * aside[near]]
     lowest = float(in_the_way.min()) + z if in_the_way.size else np.inf
-    if not free.any() or lowest < heights[np.argmax(free)]:
-        raise BadInput(
-            "home_m",
-            f"there is no free way up from ({x:g}, {y:g}, {z:g}): something is closer than"
-            f" {airspace.inflation_m:.2f} m (radius, clearance and position error)",
-            "Give a place on open ground, or leave home_m out and one is found.",
-        )
-    return x, y, float(heights[np.argmax(free)])
+    if not free.any():
+        why = airspace.blocks(places)
+        raise no_way_up(home_m, Block(int(np.bincount(why[why != Block.FREE]).argmax())), airspace)
+    top = x, y, float(heights[np.argmax(free)])
+    if lowest < top[2]:
+        raise no_way_up(home_m, Block.NEAR, airspace)
+    if (entered := _entered(home_m, top, airspace)) != Block.FREE:
+        raise no_way_up(home_m, entered, airspace)
+    return top
+
+
+def _entered(home_m: Vector3, top_m: Vector3, airspace: Airspace) -> Block:
+    """What the climb would enter; the crew that stands at home sees its first metres."""
+    if airspace.allowed is None:
+        return Block.FREE
+    return airspace.allowed.on_the_climb(np.array(home_m), np.array(top_m), home_m[2] + LEAST_CLIMB_M)
 
 
 def find_home(
@@ -130,7 +139,9 @@ def find_home(
                 leads_to[i] = None if gate is None else int(grid.component[gate])
             if leads_to[i] == component:
                 x, y, z = (round(float(a), 3) for a in ground[i])
-                return (x, y, z), (x, y, round(float(above[i, 2]), 3))
+                home, top = (x, y, z), (x, y, round(float(above[i, 2]), 3))
+                if _entered(home, top, airspace) == Block.FREE:
+                    return home, top
     raise BadInput(
         "home_m",
         "no free place on the ground was found from which the surfaces can be reached",

@@ -9,6 +9,7 @@ from schemas.contract import Vector3
 from schemas.flight_plan import SurfaceCoverage
 from schemas.problem import BadInput, LeftOut
 from tasks.planning.airspace import Airspace
+from tasks.planning.allowed import Block
 from tasks.planning.viewpoints import NO_FLY, OUTSIDE, UNSEEN, Views
 
 SHORT = 0.9  # less of a surface covered than this is said
@@ -55,6 +56,24 @@ def no_way(home_m: Vector3, airspace: Airspace) -> BadInput:
         "Give another home_m, state more free air in plan.free_m, or lower vehicle.clearance_m or the"
         " position error.",
     )
+
+
+def no_way_up(home_m: Vector3, block: Block, airspace: Airspace) -> BadInput:
+    elsewhere = "Give a place on open ground, or leave home_m out and one is found."
+    near = f"something is closer than {airspace.inflation_m:.2f} m (radius, clearance and position error)"
+    why, remedy = {
+        Block.LOW: ("all above it is lower than plan.min_altitude_m", "Lower plan.min_altitude_m."),
+        Block.HIGH: ("all above it is higher than plan.max_altitude_m", "Raise plan.max_altitude_m."),
+        Block.UNKNOWN: (
+            "it leads through or beside air that no scanner saw",
+            "Where you see that it is free, state it in plan.free_m (hairline plan --free), or give another"
+            " home_m.",
+        ),
+        Block.FENCE: (f"it is {OUTSIDE}", "Give another home_m, or widen plan.fence_m."),
+        Block.NO_FLY: (f"it is {NO_FLY}", "Give another home_m, or make plan.no_fly_m smaller."),
+    }.get(block, (near, elsewhere))
+    at = f"({home_m[0]:g}, {home_m[1]:g}, {home_m[2]:g})"
+    return BadInput("home_m", f"there is no free way up from {at}: {why}", remedy)
 
 
 def left_out(coverage: Sequence[SurfaceCoverage]) -> tuple[LeftOut, ...]:

@@ -9,6 +9,7 @@ from schemas.scan_window import ScanWindow
 from schemas.settings import PlanSettings
 from tasks.planning.airspace import Airspace
 from tasks.planning.allowed import Allowed, Block, allowed_region
+from tasks.planning.home import take_off_place
 from tests.planning.structures import World, box, rectangle
 
 MARGIN_M = 0.6
@@ -110,6 +111,26 @@ def test_fence_and_no_fly_boxes_are_kept_with_the_margin() -> None:
     assert (inside[:, 1] <= -MARGIN_M).all()
     outside = np.maximum(np.maximum(np.array(closed.low_m) - inside, inside - closed.high_m), 0.0)
     assert np.linalg.norm(outside, axis=1).min() >= MARGIN_M
+
+
+@pytest.mark.parametrize(
+    ("asked", "home_m", "why"),
+    [
+        ({"no_fly_m": (Box(low_m=(-3.0, -13.0, 2.2), high_m=(3.0, -7.0, 5.0)),)}, (0.0, -10.0), "no-fly box"),
+        ({"no_fly_m": (Box(low_m=(0.8, -13.0, 0.0), high_m=(3.0, -7.0, 1.0)),)}, (0.0, -10.0), "no-fly box"),
+        ({"fence_m": ((-9.0, -9.0), (9.0, -9.0), (9.0, 0.0), (-9.0, 0.0))}, (0.0, -10.0), "the fence"),
+        ({"free_m": (Box(low_m=(-4.0, 2.0, 4.0), high_m=(4.0, 9.0, 12.0)),)}, (0.0, 5.0), "no scanner saw"),
+        ({}, (0.0, 5.0), "no scanner saw"),
+    ],
+    ids=["box overhead", "box beside", "fence", "free air over unknown air", "unknown air"],
+)  # fmt: skip
+def test_a_home_whose_climb_enters_closed_or_unknown_air_is_refused(
+    asked: dict[str, object], home_m: tuple[float, float], why: str
+) -> None:
+    airspace = Airspace(screened().cloud, 1.0, 0.5, 100.0, region(**asked))
+    with pytest.raises(BadInput, match=why):
+        take_off_place((*home_m, 0.0), airspace)
+    assert take_off_place((8.0, -8.0, 0.0), Airspace(screened().cloud, 1.0, 0.5, 100.0, region()))[2] < 2.5
 
 
 def test_a_segment_through_unknown_air_is_refused() -> None:
