@@ -10,7 +10,8 @@ from schemas.obstacle import Obstacle
 from schemas.problem import BadInput
 from schemas.settings import SurfaceSettings
 from schemas.surface import Surface
-from tasks.surfaces.cloud import Cloud, Floats, Indices
+from tasks.surfaces.cables import cables
+from tasks.surfaces.cloud import Cloud, Floats, Indices, Mask
 from tasks.surfaces.clutter import in_clutter
 from tasks.surfaces.curved import cut_curves
 from tasks.surfaces.edges import with_edge_points, without_slivers
@@ -47,8 +48,10 @@ def extract_structure(
 
     Raises BadInput, naming `item`, where no flat surface of settings.min_area_m2 is found.
     """
+    stray_m = np.zeros((0, 3))
     if settings.noise_filter:
-        cloud = cloud[~sparse_outliers(cloud.points)]
+        stray = sparse_outliers(cloud.points)
+        stray_m, cloud = cloud.points[stray], cloud[~stray]
     on_progress(0.25)
     equal, voxel_of = cloud, np.arange(len(cloud))
     if settings.voxel_m is not None:
@@ -75,14 +78,28 @@ def extract_structure(
     left = np.ones(len(cloud), dtype=bool)
     left[np.concatenate([patch.points for patch in found])] = False
     rest = np.flatnonzero(left)
-    rest = rest[~terrain.carries(cloud.points[rest])]
-    near_m, beside_m = 2 * settings.distance_m, _cell_m(settings) / 2
-    rest = rest[~on_surfaces(cloud.points[rest], surfaces, near_m, beside_m)]
+    rest = rest[~_explained(cloud.points[rest], terrain, surfaces, settings)]
     things, held = obstacles(cloud.points[rest], settings.epsilon_m)
     solid = np.ones(len(cloud), dtype=bool)
     solid[rest[~held]] = False
+    stray_m = stray_m[~_explained(stray_m, terrain, surfaces, settings)]
+    held_m = cloud.points[rest[held]]
+    strung_m = cables(np.concatenate([stray_m, cloud.points[rest[~held]]]), held_m)
+    if len(strung_m):
+        things, _ = obstacles(np.concatenate([held_m, strung_m]), settings.epsilon_m)
     on_progress(1.0)
-    return Extraction(surfaces, things, thin(cloud.points[solid], OCCUPIED_VOXEL_M))
+    occupied_m = np.concatenate([cloud.points[solid], strung_m])
+    return Extraction(surfaces, things, thin(occupied_m, OCCUPIED_VOXEL_M))
+
+
+def _explained(
+    points_m: Floats, terrain: Terrain, surfaces: tuple[Surface, ...], settings: SurfaceSettings
+) -> Mask:
+    """(N,) which points belong to the ground or to a surface."""
+    explained = terrain.carries(points_m)
+    near_m, beside_m = 2 * settings.distance_m, _cell_m(settings) / 2
+    explained[~explained] = on_surfaces(points_m[~explained], surfaces, near_m, beside_m)
+    return explained
 
 
 def _floors(cloud: Cloud, terrain: Terrain, voxel_of: Indices, settings: SurfaceSettings) -> list[Patch]:
