@@ -19,8 +19,10 @@ from tasks.planning.viewpoints import View
 Array = npt.NDArray[np.float64]
 
 ITEMS_AROUND = 7  # home, take-off, yaw and stop above home, speed, the way back and the landing
-MOST_ITEMS_A_SHOT = 5  # gimbal, yaw, waypoint, yaw, trigger
+ITEMS_A_SHOT = 3  # waypoint, yaw, trigger; before them a yaw, and the gimbal, where these change
+MOST_ITEMS_A_SHOT = 5
 ITEMS_A_CORNER = 2
+MOST_SHOTS = (MOST_ITEMS - ITEMS_AROUND) // ITEMS_A_SHOT  # of a flight, by the vehicle's memory
 
 
 class TooFar(Exception):
@@ -69,7 +71,7 @@ def flights(
             travel = path_s(path, vehicle)
             turn = float(turn_s(stops[last].yaw_deg, stops[last + 1].yaw_deg, vehicle))
             longer = seconds + travel + shooting_s(turn, travel, vehicle, camera)
-            more = items + MOST_ITEMS_A_SHOT + ITEMS_A_CORNER * (len(path) - 2)
+            more = items + _items(stops[last], stops[last + 1], len(path) - 2)
             # Back the way it came is a way home; a shorter one is looked for where that is too long.
             back, corners = travel + back, corners + len(path) - 1
             if longer + back > usable or more + ITEMS_A_CORNER * corners > MOST_ITEMS:
@@ -82,6 +84,13 @@ def flights(
         )
         first = last + 1
     return made
+
+
+def _items(here: Stop, there: Stop, corners: int) -> int:
+    """Of a mission, from one shot to the next (as `schemas.mission` writes them)."""
+    tilts = here.pitch_deg != there.pitch_deg
+    turns = tilts or corners > 0 or here.yaw_deg != there.yaw_deg
+    return ITEMS_A_SHOT + tilts + turns + ITEMS_A_CORNER * corners
 
 
 def waypoints_along(paths: Sequence[Array], views: Sequence[View], taken: Counter[str]) -> list[Waypoint]:

@@ -114,7 +114,7 @@ def plan_and_prove(
     for view in views:
         place = np.array(view.pose.position_m)
         if entrance := base.leads_to(view.pose.position_m):
-            stops.append(Stop(place, view.pose.yaw_deg, entrance, view.surface))
+            stops.append(Stop(place, view.pose.yaw_deg, entrance, view.surface, view.pose.pitch_deg))
             shot.append(view)
     if not shot:
         raise no_way(base.home_m, airspace)

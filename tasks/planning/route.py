@@ -28,6 +28,7 @@ class Stop:
     yaw_deg: float
     entrance: Cell  # the voxel through which it is reached
     surface: str = ""
+    pitch_deg: float = 0.0
 
 
 def flying_order(stops: list[Stop], start: Order, vehicle: Vehicle, airspace: Airspace) -> Order:

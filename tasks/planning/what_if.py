@@ -9,6 +9,7 @@ from schemas.problem import BadInput
 from schemas.settings import PlanSettings
 from schemas.surface import Surface
 from schemas.vehicle import Vehicle
+from tasks.planning.flights import MOST_SHOTS
 from tasks.planning.request import planned_stand_off_m
 from tasks.planning.sight import outline_of
 from tasks.planning.timing import shooting_s, travel_s
@@ -49,7 +50,7 @@ class Case:
         step_m = 1.0 / math.sqrt(self.photos_per_m2)
         each_s = float(travel_s(step_m, vehicle)) + shooting_s(0.0, 0.0, vehicle, camera)
         usable_s = max(vehicle.endurance_s * (1 - vehicle.reserve) - THERE_AND_BACK_S, each_s)
-        flights = math.ceil(photos * each_s / usable_s)
+        flights = max(math.ceil(photos * each_s / usable_s), math.ceil(photos / MOST_SHOTS))
         return Effort(photos, (photos * each_s + flights * THERE_AND_BACK_S) / 3600.0, flights)
 
 

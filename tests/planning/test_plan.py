@@ -150,6 +150,7 @@ def test_a_mission_longer_than_a_vehicle_takes_is_split(monkeypatch: pytest.Monk
     counts = [len(mission_items(flight)) for flight in made.each_flight]
     assert len(counts) > 1
     assert max(counts) <= 100
+    assert min(counts[:-1]) > 90  # no battery is changed before it must be
     with pytest.raises(BadInput, match="at most 650"):
         mission_items(made.model_copy(update={"waypoints": made.waypoints * 4, "flights": ()}))
 
