@@ -90,8 +90,7 @@ def take_off_place(home_m: Vector3, airspace: Airspace) -> Vector3:
     in_the_way = rise[rise > ROUGH_M + STEEP * aside[near]]
     lowest = float(in_the_way.min()) + z if in_the_way.size else np.inf
     if not free.any():
-        why = airspace.blocks(places)
-        raise no_way_up(home_m, Block(int(np.bincount(why[why != Block.FREE]).argmax())), airspace)
+        raise no_way_up(home_m, Block(int(airspace.blocks(places[:1])[0])), airspace)
     top = x, y, float(heights[np.argmax(free)])
     if lowest < top[2]:
         raise no_way_up(home_m, Block.NEAR, airspace)

@@ -121,8 +121,9 @@ def test_fence_and_no_fly_boxes_are_kept_with_the_margin() -> None:
         ({"fence_m": ((-9.0, -9.0), (9.0, -9.0), (9.0, 0.0), (-9.0, 0.0))}, (0.0, -10.0), "the fence"),
         ({"free_m": (Box(low_m=(-4.0, 2.0, 4.0), high_m=(4.0, 9.0, 12.0)),)}, (0.0, 5.0), "no scanner saw"),
         ({}, (0.0, 5.0), "no scanner saw"),
+        ({}, (0.0, -4.0), "something is closer"),
     ],
-    ids=["box overhead", "box beside", "fence", "free air over unknown air", "unknown air"],
+    ids=["box overhead", "box beside", "fence", "free air over unknown air", "unknown air", "in the wall"],
 )  # fmt: skip
 def test_a_home_whose_climb_enters_closed_or_unknown_air_is_refused(
     asked: dict[str, object], home_m: tuple[float, float], why: str
