@@ -43,3 +43,16 @@ def overlap(source: Cloud, target: Cloud, T_target_source: Array, tau_m: float) 
     if len(kept) < 10:
         return Overlap(0.0, 0.0)
     return Overlap(len(kept) / len(source), float(np.linalg.eigvalsh(kept.T @ kept / len(kept))[0]))
+
+
+def share_on(sample: Cloud, target: Cloud, T_target_source: Array, voxel_m: float) -> float:
+    """Share of a sample whose surfaces lie on the target's: face the same way, and are an eighth of a coarse
+    voxel off at most, along the normal."""
+    moved_m = transform(T_target_source, sample.points_m)
+    distance_m, nearest = target.nearest(moved_m, voxel_m)
+    near = np.flatnonzero(np.isfinite(distance_m))
+    normals = target.normals[nearest[near]]
+    turned = sample.normals[near] @ T_target_source[:3, :3].T
+    off_m = np.einsum("ij,ij->i", moved_m[near] - target.points_m[nearest[near]], normals)
+    on = (np.einsum("ij,ij->i", turned, normals) > AGREEING_NORMALS) & (np.abs(off_m) < voxel_m / 8)
+    return float(on.sum()) / len(sample)

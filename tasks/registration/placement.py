@@ -2,31 +2,38 @@
 
 Where a station may stand is proposed by what is known of it, best knowledge first: a stated pose, a measured
 position (the yaw is searched), the shape of what it saw. A proposal counts only when the coarse clouds agree,
-their overlap holds in all directions, and no scanner saw through what another one met. So a wrong statement
-costs a station nothing but time, and cannot sink the others.
+their overlap holds in all directions, no scanner saw through what another one met, and no other place does as
+well. So a wrong statement costs a station nothing but time, and cannot sink the others.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from tasks.registration import feature_match, plan_search, visibility, world_frame
 from tasks.registration.icp import align
-from tasks.registration.overlap import overlap
-from tasks.registration.rigid_motion import Array, inverse, transform
+from tasks.registration.look_alikes import STATED_M, Fit, least_contradicted, nearest_rival_m
+from tasks.registration.overlap import overlap, share_on
+from tasks.registration.rigid_motion import Array, angle_deg, inverse, transform
 from tasks.registration.station_cloud import Cloud, balanced_sample, coarse_cloud
 from tasks.registration.station_site import Shape, Site
 from tasks.registration.yaw_search import DistanceField, turns, turns_about
 
 LEAST_STABILITY = 0.002  # of the overlap's normals; a floor alone has less
-MOST_SEEN_THROUGH = 0.13  # see visibility.contradiction
-MOST_AS_STATED = 0.3  # where it came to stand as it was measured: traffic between scans, not a wrong place
-STATED_M = 2.0  # around a measured position a station is looked for, and found there as it was measured
-SURELY_RIGHT = 0.03  # no better proposal is looked for
+STATED_DEG = 45.0  # of a stated heading: nearer to it than to any quarter turn
 PROPOSALS = 4  # of each kind that are tried
 MOTIONS = 150  # by plan or features, before the least contradictory are chosen
 SEARCH_POINTS = 1500
 REACH = 4.0  # coarse voxels
+
+
+@dataclass(frozen=True)
+class Placed:
+    """The largest connected component; stations by index."""
+
+    T_frame_local: dict[int, Array]  # in the frame of the first of them
+    rival_m: dict[int, float]  # of those that fit in more than one place: how far apart
 
 
 def place(
@@ -35,10 +42,10 @@ def place(
     voxel_m: float,
     min_overlap: float,
     on_progress: Callable[[float], None],
-) -> dict[int, Array]:
-    """T_frame_local of the largest connected component's stations, by index, in the frame of the first."""
+) -> Placed:
     left = list(range(len(sites)))
-    components: list[dict[int, Array]] = []
+    alone: list[int] = []  # that tied to no single station; several may tell where they stand
+    components: list[Placed] = []
     while left:
         grown = _Growing(sites, shapes, voxel_m, min_overlap, left[0])
         waiting = grown.nearest_first(left[1:])
@@ -46,14 +53,16 @@ def place(
         while waiting:
             candidate = waiting.pop(0)
             if grown.try_to_add(candidate):
-                waiting = grown.nearest_first(waiting) + refused
-                refused = []
+                waiting = grown.nearest_first(waiting) + refused + alone
+                refused, alone = [], []
                 on_progress(len(grown.T) / len(sites))
             else:
                 refused.append(candidate)
-        components.append(grown.T)
+        components.append(Placed(grown.T, grown.rival_m))
+        if len(grown.T) == 1:
+            alone.append(left[0])
         left = sorted(refused)
-    return max(components, key=len)
+    return max(components, key=lambda placed: len(placed.T_frame_local))
 
 
 class _Growing:
@@ -65,6 +74,7 @@ class _Growing:
         self.sites, self.shapes, self.voxel_m, self.min_overlap = sites, shapes, voxel_m, min_overlap
         self.reach_m = (REACH * voxel_m, 2 * voxel_m, voxel_m)
         self.T = {first: np.eye(4)}
+        self.rival_m: dict[int, float] = {}
         self._unite()
 
     def nearest_first(self, waiting: Sequence[int]) -> list[int]:
@@ -81,62 +91,103 @@ class _Growing:
         return sorted(waiting, key=lambda i: (distance_m(i), i))
 
     def try_to_add(self, candidate: int) -> bool:
-        """Place the candidate where it contradicts the placed stations least, if it may stand there."""
-        best: tuple[float, Array] | None = None
-        sample = balanced_sample(self.shapes[candidate].cloud, SEARCH_POINTS, 0)
-        for T, stated in self._proposals(candidate):
-            settled = best is not None and best[0] < MOST_SEEN_THROUGH and self._as_stated(candidate, best[1])
-            if settled and not stated:
-                break
-            aligned = align(sample, self.union, T, self.reach_m, iterations=10)
-            if aligned is None:
-                continue
-            T = aligned.T_target_source
-            found = overlap(self.shapes[candidate].cloud, self.union, T, self.voxel_m)
-            if found.share < self.min_overlap or found.stability < LEAST_STABILITY:
-                continue
-            seen_through = self._contradiction(candidate, T)
-            most = MOST_AS_STATED if stated and self._as_stated(candidate, T) else MOST_SEEN_THROUGH
-            if seen_through < most and (best is None or seen_through < best[0]):
-                best = seen_through, T
-            if seen_through < SURELY_RIGHT:
-                break
-        if best is None:
+        """Place the candidate where it contradicts the placed stations least, if it may stand only there."""
+        fits = self._fits(candidate)
+        best = least_contradicted(fits)
+        self.rival_m.pop(candidate, None)
+        if best is None or not best.borne_out:
             return False
-        self.T[candidate] = best[1]
+        rival_m = nearest_rival_m(best, fits, self.shapes[candidate].cloud, self.reach_m[0])
+        if rival_m is not None:
+            self.rival_m[candidate] = rival_m
+            return False
+        self.T[candidate] = best.T_frame_local
         self._unite()
         return True
 
-    def _as_stated(self, candidate: int, T: Array) -> bool:
-        """Whether the candidate came to stand where it was measured."""
-        site, T_frame_world = self.sites[candidate], self._frame_of_world()
-        if site.position_m is None or site.scanner_m is None or T_frame_world is None:
-            return False
-        apart_m = transform(T, site.scanner_m[None])[0] - transform(T_frame_world, site.position_m[None])[0]
-        return bool(np.linalg.norm(apart_m) < STATED_M)
+    def _fits(self, candidate: int) -> list[Fit]:
+        """Where the candidate may stand; by its shape only where it cannot stand as it was stated."""
+        sample = balanced_sample(self.shapes[candidate].cloud, SEARCH_POINTS, 0)
+        fits: list[Fit] = []
+        for kind in (self._by_statement, self._by_plan, self._by_features):
+            if any(fit.settled for fit in fits):
+                break
+            for T in kind(candidate):
+                fit = self._fit(candidate, sample, T)
+                if fit is not None:
+                    fits.append(fit)
+        return fits
 
-    def _proposals(self, candidate: int) -> Iterator[tuple[Array, bool]]:
-        """T_frame_local, and whether it stands on a statement."""
-        site, shape = self.sites[candidate], self.shapes[candidate]
-        T_frame_world = self._frame_of_world()
-        if site.prior_T_world_local is not None and T_frame_world is not None:
-            yield T_frame_world @ site.prior_T_world_local, True
+    def _fit(self, candidate: int, sample: Cloud, T: Array) -> Fit | None:
+        """The candidate moved from T to where its sample lies on the placed stations, and what is against
+        that; None where too little holds it there."""
+        aligned = align(sample, self.union, T, self.reach_m, iterations=10)
+        if aligned is None:
+            return None
+        T = aligned.T_target_source
+        found = overlap(self.shapes[candidate].cloud, self.union, T, self.voxel_m)
+        if found.share < self.min_overlap or found.stability < LEAST_STABILITY:
+            return None
+        sights = self._sights(candidate, T)
+        seen_through, off_m = visibility.contradiction(sights), self._off_statement_m(candidate, T)
+        judged = seen_through is not None or off_m < STATED_M
+        share = None if judged else self._share_on(candidate, T)
+        return Fit(T, aligned.rmse_m, share, seen_through, visibility.doubt(sights), off_m)
+
+    def _share_on(self, candidate: int, T: Array) -> float:
+        """Of the candidate's surfaces and a placed station's together, those that lie on the other's; by the
+        station of which it is most."""
+        ours, shares = self.shapes[candidate], []
+        for i, T_other in self.T.items():
+            other, T_other_ours = self.shapes[i], inverse(T_other) @ T
+            on = share_on(ours.sample, other.middle, T_other_ours, self.voxel_m)
+            back = share_on(other.sample, ours.middle, inverse(T_other_ours), self.voxel_m)
+            shares.append((on + back) / 2)
+        return max(shares)
+
+    def _by_statement(self, candidate: int) -> Iterator[Array]:
+        site = self.sites[candidate]
+        if site.prior_T_world_local is not None and self.T_frame_world is not None:
+            yield self.T_frame_world @ site.prior_T_world_local
         if site.position_m is not None and site.scanner_m is not None:
-            for T in self._turned(site, shape, T_frame_world):
-                yield T, True
-        for search in (self._by_plan, self._by_features):
-            for T in self._least_contradicting(candidate, search(shape)):
-                yield T, False
+            yield from self._turned(site, self.shapes[candidate])
 
-    def _turned(self, site: Site, shape: Shape, T_frame_world: Array | None) -> Iterator[Array]:
+    def _off_statement_m(self, candidate: int, T: Array) -> float:
+        """How far from where it was measured the candidate came to stand; infinity where that is not known or
+        it faces otherwise than stated. While nothing fixes where the measured world lies, the distances
+        between the scanners tell."""
+        site, prior = self.sites[candidate], self.sites[candidate].prior_T_world_local
+        if prior is not None and self.T_frame_world is not None:
+            apart = inverse(self.T_frame_world @ prior) @ T
+            if angle_deg(apart) > STATED_DEG:
+                return np.inf
+            if site.scanner_m is None:
+                middle_m = np.median(self.shapes[candidate].cloud.points_m, axis=0)
+                return float(np.linalg.norm(transform(apart, middle_m[None])[0] - middle_m))
+        if site.position_m is None or site.scanner_m is None:
+            return np.inf
+        stands_m = transform(T, site.scanner_m[None])[0]
+        if self.T_frame_world is not None:
+            return float(np.linalg.norm(stands_m - transform(self.T_frame_world, site.position_m[None])[0]))
+        off_m = [
+            abs(
+                float(np.linalg.norm(stands_m - transform(T_other, other.scanner_m[None])[0]))
+                - float(np.linalg.norm(site.position_m - other.position_m))
+            )
+            for other, T_other in ((self.sites[i], T_i) for i, T_i in self.T.items())
+            if other.position_m is not None and other.scanner_m is not None
+        ]
+        return max(off_m, default=np.inf)
+
+    def _turned(self, site: Site, shape: Shape) -> Iterator[Array]:
         """Proposals from the measured position; none where no placed station has one."""
         assert site.position_m is not None and site.scanner_m is not None
         sample_m = balanced_sample(shape.cloud, SEARCH_POINTS, 0).points_m - site.scanner_m
         to_scanner = np.eye(4)
         to_scanner[:3, 3] = -site.scanner_m
         measured = [i for i in self.T if self.sites[i].position_m is not None]
-        if T_frame_world is not None:
-            position_m = transform(T_frame_world, site.position_m[None])[0]
+        if self.T_frame_world is not None:
+            position_m = transform(self.T_frame_world, site.position_m[None])[0]
             for _, T in turns(self.field, sample_m.astype(np.float64), position_m, STATED_M, PROPOSALS):
                 yield T @ to_scanner
         elif measured:
@@ -154,19 +205,22 @@ class _Growing:
                 T[:3, 3] += anchor_m
                 yield T @ to_scanner
 
-    def _by_plan(self, shape: Shape) -> list[Array]:
+    def _by_plan(self, candidate: int) -> list[Array]:
         """From the plan, which knows no heights and shifts by cells, each moved to where the clouds meet."""
-        found = plan_search.shifts_and_turns(shape.cloud, self.union, self.voxel_m, MOTIONS)
-        sample_m = balanced_sample(shape.cloud, SEARCH_POINTS // 3, 0).points_m.astype(np.float64)
-        return [self.field.settled(T, sample_m) for T in found]
+        cloud = self.shapes[candidate].cloud
+        found = plan_search.shifts_and_turns(cloud, self.union, self.voxel_m, MOTIONS)
+        sample_m = balanced_sample(cloud, SEARCH_POINTS // 3, 0).points_m.astype(np.float64)
+        return self._least_contradicting(candidate, (self.field.settled(T, sample_m) for T in found))
 
-    def _by_features(self, shape: Shape) -> list[Array]:
+    def _by_features(self, candidate: int) -> list[Array]:
+        shape = self.shapes[candidate]
         features = np.concatenate([self.shapes[i].features for i in self.T])
         source, target = feature_match.matches(shape.features, features)
         source_m = shape.cloud.points_m[source].astype(np.float64)
-        return feature_match.motions(source_m, self.united_m[target], self.voxel_m, MOTIONS)
+        found = feature_match.motions(source_m, self.united_m[target], self.voxel_m, MOTIONS)
+        return self._least_contradicting(candidate, found)
 
-    def _least_contradicting(self, candidate: int, motions: list[Array]) -> list[Array]:
+    def _least_contradicting(self, candidate: int, motions: Iterable[Array]) -> list[Array]:
         """Where parts look alike, much may agree on a wrong motion: what was seen through decides. Motions
         that bring too little together do not count."""
         cloud = self.shapes[candidate].cloud
@@ -178,9 +232,6 @@ class _Growing:
             return visibility.doubt(self._sights(candidate, T))
 
         return sorted(filter(meets, motions), key=doubt)[: 2 * PROPOSALS]
-
-    def _contradiction(self, candidate: int, T: Array) -> float:
-        return visibility.contradiction(self._sights(candidate, T))
 
     def _sights(self, candidate: int, T: Array) -> list[tuple[float, float]]:
         """Of all placed stations: people and cars weigh little in what many saw."""
@@ -221,3 +272,4 @@ class _Growing:
         both = Cloud(self.united_m.astype(np.float32), np.concatenate(normals).astype(np.float32))
         self.union = coarse_cloud(both, self.voxel_m)
         self.field = DistanceField.of(self.union.points_m, self.voxel_m, REACH * self.voxel_m)
+        self.T_frame_world = self._frame_of_world()

@@ -32,6 +32,9 @@ from tasks.registration.site_datum import Sighting, residuals, tie_to_datum, unu
 from tasks.registration.station_site import Site, shape
 from tasks.registration.ties import Tie, aligned, candidate_pairs, ties
 
+NO_OVERLAP = "it overlaps no other scan enough to be tied to it"
+STATE_POSITION = "State position_m of its station and of those beside it, or scan with more overlap."
+
 
 @dataclass(frozen=True)
 class Registration:
@@ -62,8 +65,8 @@ def register(
         folder = Path(name)
         shelf = Shelf(folder)
         sites, left_out = load_stations(scans, settings, shelf, lambda f: on_progress(0.4 * f))
-        tied, T_first, kept = _tie_together(sites, settings, lambda f: on_progress(0.4 + 0.5 * f))
-        loose = [site for i, site in enumerate(sites) if i not in tied]
+        tied, T_first, kept, rival_m = _tie_together(sites, settings, lambda f: on_progress(0.4 + 0.5 * f))
+        loose = [_untied(site, rival_m.get(i)) for i, site in enumerate(sites) if i not in tied]
         _refuse(sites, loose, settings.require_all)
         sites = [sites[i] for i in tied]
         T_world, origin_m, T_world_first, found, unused_targets = _in_world(sites, T_first, targets)
@@ -75,27 +78,27 @@ def register(
         stations=_stations(sites, T_first, T_world, T_world_first, [t.edge for t in kept]),
         pairs=tuple(_scan_pair(one, sites) for one in kept),
         targets=found,
-        left_out=(*left_out, *map(_disconnected, loose), *unused_targets),
+        left_out=(*left_out, *loose, *unused_targets),
     )
 
 
 def _tie_together(
     sites: Sequence[Site], settings: RegistrationSettings, on_progress: Callable[[float], None]
-) -> tuple[list[int], list[Array], list[Tie]]:
+) -> tuple[list[int], list[Array], list[Tie], dict[int, float]]:
     """Stations of the largest component, their poses in the frame of its first, and the ties between them by
-    their place in that list."""
+    their place in that list; of the others, those that fit in several places, and how far these are apart."""
     voxel_m = max(float(np.median([s.coarse_voxel_m for s in sites])), settings.tau_m)
     shapes = [shape(s, voxel_m) for s in sites]
-    T_placed = place(sites, shapes, voxel_m, settings.min_overlap, lambda f: on_progress(0.4 * f))
+    placed = place(sites, shapes, voxel_m, settings.min_overlap, lambda f: on_progress(0.4 * f))
     edges = []
-    pairs = list(candidate_pairs(T_placed, shapes, voxel_m, settings.min_overlap))
+    pairs = list(candidate_pairs(placed.T_frame_local, shapes, voxel_m, settings.min_overlap))
     for k, (source, target, T_start) in enumerate(pairs):
         edge = aligned(shapes, source, target, T_start, settings)
         if edge is not None:
             edges.append(edge)
         on_progress(0.4 + 0.5 * (k + 1) / len(pairs))
     all_ties = ties(sites, edges, settings)
-    tied = sorted(component(min(T_placed), [t.edge for t in all_ties]))
+    tied = sorted(component(min(placed.T_frame_local), [t.edge for t in all_ties]))
     at = {station: k for k, station in enumerate(tied)}
     kept = [
         replace(t, edge=replace(t.edge, source=at[t.edge.source], target=at[t.edge.target]))
@@ -103,7 +106,7 @@ def _tie_together(
         if t.edge.source in at
     ]
     T_first, kept = _adjust(len(tied), kept, settings.tau_m / 2)
-    return tied, T_first, kept
+    return tied, T_first, kept, placed.rival_m
 
 
 def _adjust(stations: int, ties: list[Tie], wrong_m: float) -> tuple[list[Array], list[Tie]]:
@@ -117,8 +120,15 @@ def _adjust(stations: int, ties: list[Tie], wrong_m: float) -> tuple[list[Array]
     return T_first, ties
 
 
-def _refuse(sites: Sequence[Site], loose: Sequence[Site], require_all: bool) -> None:
-    if len(sites) > 1 and len(loose) == len(sites) - 1:
+def _refuse(sites: Sequence[Site], loose: Sequence[LeftOut], require_all: bool) -> None:
+    none_tied = len(sites) > 1 and len(loose) == len(sites) - 1
+    unsure = [one for one in loose if one.what != NO_OVERLAP]
+    if unsure and (none_tied or require_all):
+        why = "; ".join(f"{one.item}: {one.what}" for one in unsure)
+        raise BadInput(
+            ", ".join(one.item for one in unsure), f"they cannot be tied for sure: {why}", STATE_POSITION
+        )
+    if none_tied:
         raise BadInput(
             ", ".join(s.name for s in sites),
             "no two of these scans overlap enough to be tied to each other",
@@ -126,7 +136,7 @@ def _refuse(sites: Sequence[Site], loose: Sequence[Site], require_all: bool) -> 
         )
     if loose and require_all:
         raise BadInput(
-            ", ".join(s.name for s in loose),
+            ", ".join(one.item for one in loose),
             "no overlap ties them to the other scans, and all are required",
             "Scan again with more overlap, or set require_all to false to go on without them.",
         )
@@ -198,13 +208,13 @@ def _stations(
     return tuple(found)
 
 
-def _disconnected(site: Site) -> LeftOut:
-    return LeftOut(
-        item=site.name,
-        stage=STAGE,
-        what="it overlaps no other scan enough to be tied to it",
-        remedy="Scan again with more overlap, or state the station's position.",
-    )
+def _untied(site: Site, rival_m: float | None) -> LeftOut:
+    """Why the scan stands alone. rival_m: between places where it fits, if there are several."""
+    if rival_m is None:
+        remedy = "Scan again with more overlap, or state the station's position."
+        return LeftOut(item=site.name, stage=STAGE, what=NO_OVERLAP, remedy=remedy)
+    what = f"it fits in more than one place about equally well, {rival_m:.1f} m apart"
+    return LeftOut(item=site.name, stage=STAGE, what=what, remedy=STATE_POSITION)
 
 
 def _scan_pair(tied: Tie, sites: Sequence[Site]) -> ScanPair:

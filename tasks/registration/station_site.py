@@ -18,6 +18,7 @@ from tasks.registration.standpoint import standpoint
 from tasks.registration.station_cloud import (
     Cloud,
     away_from,
+    balanced_sample,
     coarse_cloud,
     coarse_voxel_m,
     fine_cloud,
@@ -29,6 +30,7 @@ from tasks.registration.station_cloud import (
 MOST_AWAY = 0.1
 LEAST_POINTS = 100  # fewer, at equal density, are no scan of a structure
 FEATURE_RADII = 5  # coarse voxels
+SAMPLE_POINTS = 3000  # likewise to a percent
 OVERLAP_POINTS = 20_000  # tell a share of them to half a percent
 
 
@@ -61,6 +63,11 @@ class Shape:
     def features(self) -> Features:
         """Only stations without a usable position need them."""
         return shape_features(self.cloud, FEATURE_RADII * self.voxel_m)
+
+    @cached_property
+    def sample(self) -> Cloud:
+        """Of all facings alike; only where no scanner's place is known is it needed."""
+        return balanced_sample(self.middle, SAMPLE_POINTS, 0)
 
 
 def site(scan: Scan, blocks: Iterable[LoadedScan], voxel_m: float, shelf: Shelf) -> Site:

@@ -103,14 +103,14 @@ def sight(
     return through, met
 
 
-def contradiction(sights: Sequence[tuple[float, float]]) -> float:
-    """Share of all that was in sight that was seen through; 0 where too little was.
+def contradiction(sights: Sequence[tuple[float, float]]) -> float | None:
+    """Share of all that was in sight that was seen through; None where too little was in sight.
 
     True alignments of still scenes have 0.00, of streets and rooms up to 0.08; wrong ones of look-alike
-    bridges 0.17 and more.
+    bridges 0.12 and more.
     """
     through, met = sum(t for t, _ in sights), sum(m for _, m in sights)
-    return through / (through + met) if through + met > ENOUGH else 0.0
+    return through / (through + met) if through + met > ENOUGH else None
 
 
 def doubt(sights: Sequence[tuple[float, float]]) -> float:

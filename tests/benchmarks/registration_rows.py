@@ -253,10 +253,10 @@ def _placed_blindly(case: Survey, pairs: Sequence[tuple[str, str]]) -> list[Arra
     for pair in pairs:
         source, target = (at[name] for name in pair)
         two = [target, source]
-        T = place(
+        placed = place(
             [sites[k] for k in two], [shapes[k] for k in two], voxel_m, SETTINGS.min_overlap, lambda _: None
         )
-        found.append(T[1] if len(T) == 2 else None)
+        found.append(placed.T_frame_local.get(1))
     return found
 
 
