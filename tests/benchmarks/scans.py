@@ -4,7 +4,13 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from importlib.util import find_spec
 
-from tests.benchmarks import real_scan_rows, registration_rows, scan_scale_rows, surface_rows
+from tests.benchmarks import (
+    look_alike_rows,
+    real_scan_rows,
+    registration_rows,
+    scan_scale_rows,
+    surface_rows,
+)
 from tests.benchmarks.table import Row, absent, gather
 
 
@@ -22,6 +28,7 @@ def other_peers() -> list[Row]:
 
 PARTS: dict[str, Callable[[], Iterator[Row] | list[Row]]] = {
     **registration_rows.PARTS,
+    "look-alikes": look_alike_rows.rows,
     **scan_scale_rows.PARTS,
     "real": real_scan_rows.rows,
     **{name: partial(surface_rows.structure, name) for name in surface_rows.BARS},
