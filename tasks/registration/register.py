@@ -33,7 +33,7 @@ from tasks.registration.station_site import Site, shape
 from tasks.registration.ties import Tie, aligned, candidate_pairs, ties
 
 NO_OVERLAP = "it overlaps no other scan enough to be tied to it"
-STATE_POSITION = "State position_m of its station and of those beside it, or scan with more overlap."
+STATE_POSITION = "State position_m of its station and of those beside, or its T_world_scan, or overlap more."
 
 
 @dataclass(frozen=True)
