@@ -30,12 +30,12 @@ train-detector: .venv/.ready  # two hours on two cores; PHOTOS=FOLDER holds imag
 	$(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/run --fold 0
 	$(BIN)/python -m training.export build/training/run/weights.pt build/training/hairline.onnx
 
-train-folds: .venv/.ready  # half an hour each: a network for each fold but the shipped one's, for bench-detection
+train-folds: .venv/.ready  # half an hour each: a network for each fold, for bench-detection
 	@[ -n "$(PHOTOS)" ] || { echo "Name the photos: make train-folds PHOTOS=FOLDER"; exit 1; }
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[train]'
 	$(BIN)/python -m training.surfaces build/training/surfaces 900
 	mkdir -p build/training/folds
-	for k in 1 2 3 4; do \
+	for k in 0 1 2 3 4; do \
 	  $(BIN)/python -m training.train $(PHOTOS) build/training/surfaces build/training/fold$$k --fold $$k --steps 8000 \
 	  && $(BIN)/python -m training.export build/training/fold$$k/weights.pt build/training/folds/$$k.onnx 1.1 -1 \
 	  || exit 1; done

@@ -23,7 +23,7 @@ from tasks.detection.windows import Window, whole_of, windows
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
-SHA256 = "08a67496a41852c97b5d38bac2ed10a285b4975b8e30f59557c1e5bf7b6080f3"
+SHA256 = "924ced1ebdc90df366caacacd4e94f32edfb3c576049bc6815dd73518b50fbb1"
 STRIDE = 32
 OCTAVES = (2, 1)  # our network is asked at 1 / 2^octave of the size too
 SEEN_PX = 6_000_000  # at once: 120 bytes each (measured)
