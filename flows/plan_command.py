@@ -22,10 +22,12 @@ from schemas.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from schemas.camera import Camera
+    from schemas.flight_plan import FlightPlan
     from schemas.geodesy import GeoOrigin
     from schemas.structure import Structure
 
 Six = tuple[float, float, float, float, float, float]
+USUAL_GIMBAL_DEG = 35.0  # up: of a Mavic 3 Enterprise; a Matrice's cameras reach 30°
 
 
 @app.command
@@ -152,11 +154,22 @@ def _plan(
     say(f"{photos} photos, {planned.length_m:.0f} m, {minutes:.1f} min{many}: {out / 'plan.json'}")
     say(f"{planned.way_home[0].upper()}{planned.way_home[1:]}")
     warn(planned.left_out)
+    if (doubt := looks_up(planned, vehicle)) is not None:
+        err.print(f"[yellow]Warning: {doubt}[/yellow]")
     if origin is None:
         err.print(
             "[yellow]Warning: no --origin, --anchor or --utm-zone: the mission lies at ArduPilot's simulator,"
             " not at yours[/yellow]"
         )
+
+
+def looks_up(planned: "FlightPlan", vehicle: Vehicle) -> str | None:
+    """A doubt whether the gimbal can, where nobody stated its range."""
+    steep = [w.pitch_deg for w in planned.shooting_points if w.pitch_deg > USUAL_GIMBAL_DEG]
+    if not steep or "gimbal_pitch_max_deg" in vehicle.model_fields_set:
+        return None
+    seen = f"{len(steep)} photos look up by as much as {max(steep):.0f}°, which few gimbals do"
+    return f"{seen}: state vehicle.gimbal_pitch_max_deg"
 
 
 def _where(
