@@ -23,14 +23,12 @@ with reused():
     print(first_touches())
 with reused():
     print(first_touches())
-print(first_touches())
 """
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc is told to keep what is freed")
-def test_blocks_serve_again_inside_and_the_next_time_and_are_given_back_outside() -> None:
+def test_blocks_serve_again_inside_and_the_next_time() -> None:
     """In a process of its own: what others did with its memory would count."""
     told = subprocess.run([sys.executable, "-c", PROGRAM], check=True, capture_output=True, text=True)
-    before, inside, again, after = (int(count) for count in told.stdout.split())
+    before, inside, again = (int(count) for count in told.stdout.split())
     assert inside < before / 5 and again < before / 5
-    assert after > before / 2
