@@ -19,7 +19,7 @@ AS_FREE = 10.0  # times the doubt and more, by something that stands in one of t
 SPREAD_POINTS = 100  # of a cloud tell how far apart two of its places are
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A place where the scan meets those placed before."""
 
@@ -70,16 +70,20 @@ def least_contradicted(fits: Sequence[Fit]) -> Fit | None:
     return min(possible, key=lambda fit: (fit.doubt, fit.misfit_m), default=None)
 
 
-def nearest_rival_m(best: Fit, fits: Sequence[Fit], cloud: Cloud, reach_m: float) -> float | None:
-    """How far from the best the nearest place is where the scan may stand as well; None where there is none.
+def rivals(best: Fit, fits: Sequence[Fit], cloud: Cloud, reach_m: float) -> dict[Fit, float]:
+    """The places where the scan may stand as well, each once, and how far they are from the best.
 
     A rival is possible, strays no more from what was stated, meets the others about as closely, and what was
     seen speaks against it hardly more. Fits that move the points to within `reach_m` of each other on average
     are one place: alignment joins them.
     """
     points_m = cloud.points_m[:: max(1, len(cloud) // SPREAD_POINTS)]
-    at_m = transform(best.T_frame_local, points_m)
-    rivals = [
+
+    def apart_m(a: Fit, b: Fit) -> float:
+        at_m, other_m = (transform(fit.T_frame_local, points_m) for fit in (a, b))
+        return float(np.linalg.norm(at_m - other_m, axis=1).mean())
+
+    near = [
         fit
         for fit in fits
         if fit.possible
@@ -87,5 +91,8 @@ def nearest_rival_m(best: Fit, fits: Sequence[Fit], cloud: Cloud, reach_m: float
         and fit.misfit_m < AS_CLOSE * best.misfit_m
         and fit.doubt < AS_FREE * best.doubt
     ]
-    apart_m = [np.linalg.norm(transform(fit.T_frame_local, points_m) - at_m, axis=1).mean() for fit in rivals]
-    return min((float(apart) for apart in apart_m if apart > reach_m), default=None)
+    found: dict[Fit, float] = {}
+    for fit in near:
+        if all(apart_m(fit, other) > reach_m for other in (best, *found)):
+            found[fit] = apart_m(fit, best)
+    return found

@@ -7,13 +7,14 @@ well. So a wrong statement costs a station nothing but time, and cannot sink the
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 
 from tasks.registration import feature_match, plan_search, visibility, world_frame
 from tasks.registration.icp import align
-from tasks.registration.look_alikes import STATED_M, Fit, least_contradicted, nearest_rival_m
+from tasks.registration.look_alikes import STATED_M, Fit, least_contradicted, rivals
 from tasks.registration.overlap import overlap, share_on
 from tasks.registration.rigid_motion import Array, angle_deg, inverse, transform
 from tasks.registration.station_cloud import Cloud, balanced_sample, coarse_cloud
@@ -52,7 +53,7 @@ def place(
         refused: list[int] = []  # since the component last grew
         while waiting:
             candidate = waiting.pop(0)
-            if grown.try_to_add(candidate):
+            if grown.try_to_add(candidate, [*waiting, *refused]):
                 waiting = grown.nearest_first(waiting) + refused + alone
                 refused, alone = [], []
                 on_progress(len(grown.T) / len(sites))
@@ -90,20 +91,37 @@ class _Growing:
 
         return sorted(waiting, key=lambda i: (distance_m(i), i))
 
-    def try_to_add(self, candidate: int) -> bool:
-        """Place the candidate where it contradicts the placed stations least, if it may stand only there."""
+    def try_to_add(self, candidate: int, others: Sequence[int]) -> bool:
+        """Place the candidate where it contradicts the placed stations least, if it may stand only there, or
+        if of all such places only one lets some of the others stand as they were measured."""
         fits = self._fits(candidate)
         best = least_contradicted(fits)
         self.rival_m.pop(candidate, None)
         if best is None or not best.borne_out:
             return False
-        rival_m = nearest_rival_m(best, fits, self.shapes[candidate].cloud, self.reach_m[0])
-        if rival_m is not None:
-            self.rival_m[candidate] = rival_m
-            return False
+        found = rivals(best, fits, self.shapes[candidate].cloud, self.reach_m[0])
+        if found:
+            vouched = [fit for fit in (best, *found) if self._vouched_for(candidate, fit, others)]
+            if len(vouched) != 1:
+                self.rival_m[candidate] = min(found.values())
+                return False
+            best = vouched[0]
         self.T[candidate] = best.T_frame_local
         self._unite()
         return True
+
+    def _vouched_for(self, candidate: int, fit: Fit, others: Sequence[int]) -> bool:
+        """Whether another station would stand where it was measured if the candidate stood there. Two
+        distances between scanners may agree on either side of a structure; a third tells."""
+        if self.T_frame_world is not None or fit.strays > 0:
+            return False
+        supposed = copy(self)
+        supposed.T = self.T | {candidate: fit.T_frame_local}
+        supposed._unite()
+        if supposed.T_frame_world is None:
+            return False
+        agreeing = (least_contradicted(supposed._fits(other)) for other in others)
+        return any(one is not None and one.strays == 0 for one in agreeing)
 
     def _fits(self, candidate: int) -> list[Fit]:
         """Where the candidate may stand; by its shape only where it cannot stand as it was stated."""

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from schemas.problem import BadInput
-from tasks.registration.look_alikes import Fit, least_contradicted, nearest_rival_m
+from schemas.scanning import Scanning
+from tasks.registration.look_alikes import Fit, least_contradicted, rivals
 from tasks.registration.rigid_motion import Array, inverse, transform, yaw
 from tasks.registration.station_cloud import Cloud
+from tests.benchmarks.look_alike_rows import equal_piers
+from tests.benchmarks.surveys import pose_errors, registered, survey
 from tests.registration.site import (
     BRIDGE,
     YARD,
@@ -69,6 +72,14 @@ def test_stated_positions_tell_the_piers_apart(seed: int, tmp_path: Path) -> Non
     assert worst_deg < 0.02
 
 
+def test_a_third_position_tells_on_which_side_the_second_scanner_stood(tmp_path: Path) -> None:
+    """Three piers on the other side of the first, the second scanner is as far from it to 10 cm."""
+    case = survey(equal_piers(1), Scanning(step_deg=0.3), tmp_path)
+    _, T, _ = registered(case)
+    assert len(T) == 3
+    assert max(pose_errors(T, case).station_mm.values()) < 2.0
+
+
 def test_stations_in_sight_of_what_is_there_once_are_tied(tmp_path: Path) -> None:
     """The third sees the houses too, but 24 m on it would see them where the others' range ends."""
     found = register(scanned(tmp_path, (*VIADUCT, *HOUSES), 1, stated=False), SETTINGS)
@@ -104,7 +115,7 @@ def test_a_rival_is_another_place_that_does_as_well() -> None:
     def rival_m(*others: Fit) -> float | None:
         fits = [fit(0.0), *others]
         best = least_contradicted(fits)
-        return None if best is None else nearest_rival_m(best, fits, cloud, 1.0)
+        return None if best is None else min(rivals(best, fits, cloud, 1.0).values(), default=None)
 
     assert rival_m(fit(24.0), fit(12.0)) == pytest.approx(12.0)
     assert rival_m(fit(0.5)) is None  # the same place
