@@ -14,7 +14,7 @@ STATED_M = 2.0  # around a measured position a station is looked for, and found 
 MOST_SEEN_THROUGH = 0.11  # see visibility.contradiction
 MOST_AS_STATED = 0.3  # where it came to stand as it was measured: traffic between scans, not a wrong place
 LEAST_ON = 0.25  # of a scan lies on another where nothing was in sight; of unrelated ones less, or all over
-AS_CLOSE = 4.0  # times as far off surfaces may be where like parts are met; where unlike ones are, 5 and more
+AS_CLOSE = 3.0  # times as far off surfaces may be where like parts are met; unlike ones are 3.5 and more
 AS_FREE = 10.0  # times the doubt and more, by something that stands in one of the two places only
 SPREAD_POINTS = 100  # of a cloud tell how far apart two of its places are
 
