@@ -11,6 +11,7 @@ import tifffile
 SCALE, TRANSFORMATION, NODATA = 33550, 34264, 42113  # ModelPixelScale, ModelTransformation, GDAL_NODATA
 PROJECTED, WEB_MERCATOR = 1, 3857  # of GTModelType; a map whose metres are none but on the equator
 METRES = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}  # of ProjLinearUnits (EPSG)
+ALPHA = (1, 2)  # of ExtraSamples: transparency, premultiplied or not; any other is a band more
 COARSEST_MM_PX = 100.0  # no crack is looked for in a coarser one: its unit is none of ours
 
 
@@ -33,7 +34,7 @@ def told_by(path: Path) -> Told | None:
             return Told(
                 int(page.imagewidth),
                 int(page.imagelength),
-                bool(page.extrasamples) and page.bitspersample == 8,
+                page.bitspersample == 8 and any(kind in ALPHA for kind in page.extrasamples),
                 SCALE in page.tags or TRANSFORMATION in page.tags,
                 _gsd_mm_px(page),
                 None if nodata is None else _level(nodata.value),

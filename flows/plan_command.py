@@ -152,7 +152,7 @@ def _plan(
     photos, minutes = len(planned.shooting_points), planned.duration_s / 60
     many = f" in {len(planned.flights)} flights" if len(planned.flights) > 1 else ""
     say(f"{photos} photos, {planned.length_m:.0f} m, {minutes:.1f} min{many}: {out / 'plan.json'}")
-    say(f"{planned.way_home[0].upper()}{planned.way_home[1:]}")
+    say(planned.way_home)
     warn(planned.left_out)
     if (doubt := looks_up(planned, vehicle)) is not None:
         err.print(f"[yellow]Warning: {doubt}[/yellow]")

@@ -93,11 +93,11 @@ class FlightPlan(Contract):
         """What a failsafe may do, in words."""
         if self.return_height_m is None:
             return (
-                "no height is known at which a failsafe can come straight home: let it land, or fly back the"
+                "No height is known at which a failsafe can come straight home: let it land, or fly back the"
                 " way it came (SmartRTL)"
             )
         return (
-            f"a failsafe comes home through known air with RTL_ALT at {self.return_height_m:g} m"
+            f"A failsafe comes home through known air with RTL_ALT at {self.return_height_m:g} m"
             f" ({100 * self.return_height_m:.0f} cm): set it before take-off"
         )
 

@@ -34,7 +34,7 @@ def pages(inputs: Mapping[str, Any], made: FlightPlan) -> list[Page]:
         f"{len(made.shooting_points)} photos, {made.length_m:.0f} m, {made.duration_s / 60:.1f} min,"
         f" overlap {made.overlap:.0%}, {len(made.each_flight)} of a battery each.",
         "",
-        f"{made.way_home[0].upper()}{made.way_home[1:]}.",
+        f"{made.way_home}.",
         *(["", _anchored(made.origin), ""] if made.origin.residual_m is not None else []),
         "| surface | area m² | covered | can be reached | of it in two photos | in 95 of 100 flights"
         " | measurable mm | stand-off m | mm/px | photos | not reached |",

@@ -120,7 +120,8 @@ class _Growing:
         supposed._unite()
         if supposed.T_frame_world is None:
             return False
-        agreeing = (least_contradicted(supposed._fits(other)) for other in others)
+        measured = (other for other in others if self.sites[other].position_m is not None)
+        agreeing = (least_contradicted(supposed._fits(other)) for other in measured)
         return any(one is not None and one.strays == 0 for one in agreeing)
 
     def _fits(self, candidate: int) -> list[Fit]:

@@ -121,7 +121,8 @@ def test_a_rival_is_another_place_that_does_as_well() -> None:
     assert rival_m(fit(0.5)) is None  # the same place
     assert rival_m(fit(12.0, doubt=0.12)) is None  # seen through
     assert rival_m(fit(12.0, doubt=0.101)) is None  # far more was
-    assert rival_m(fit(12.0, rmse_m=0.05)) is None  # other parts, that only resemble
+    assert rival_m(fit(12.0, rmse_m=0.025)) == pytest.approx(12.0)
+    assert rival_m(fit(12.0, rmse_m=0.035)) is None  # other parts, that only resemble: measured on bridges
     assert rival_m(fit(12.0, doubt=0.05, off_m=0.1)) is None  # stated, so it is the place
     assert rival_m(fit(12.0, off_m=0.1), fit(24.0, off_m=1.0)) is None  # half a metre off counts
     assert rival_m(fit(12.0, off_m=0.1), fit(36.0, off_m=0.2)) == pytest.approx(24.0)

@@ -121,7 +121,7 @@ def test_the_size_is_known_without_reading_and_whatever_it_is(tmp_path: Path) ->
 
 
 def geotiff(path: Path, steps: tuple[float, float], **keys: int) -> Path:
-    """Of 0.5 m steps, say; keys by their GeoTIFF number."""
+    """Its pixels are `steps` apart in the map's unit; keys by their GeoTIFF number, as _1024=1."""
     entries = [
         n for key, value in sorted((int(k[1:]), v) for k, v in keys.items()) for n in (key, 0, 1, value)
     ]
@@ -169,7 +169,12 @@ def test_our_own_mosaic_comes_back_with_its_scale_and_its_blank_parts(tmp_path: 
     assert known[:256, 256:512].all() and known.sum() == 256 * 256
 
 
-def test_a_photo_saved_as_tiff_is_no_mosaic(tmp_path: Path) -> None:
+def test_a_photo_saved_as_tiff_is_no_mosaic_but_what_is_transparent_is(tmp_path: Path) -> None:
     Image.fromarray(rgba(300, 400)[..., :3]).save(tmp_path / "photo.tif")
+    Image.fromarray(rgba(300, 400)).save(tmp_path / "cut.tif")
+    tifffile.imwrite(
+        tmp_path / "infrared.tif", rgba(300, 400), photometric="rgb", extrasamples=["unspecified"]
+    )
     with store.temporary() as files:
-        assert not is_mosaic(files.put(tmp_path / "photo.tif"))
+        known = [is_mosaic(files.put(tmp_path / f"{name}.tif")) for name in ("photo", "cut", "infrared")]
+    assert known == [False, True, False]
