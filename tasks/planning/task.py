@@ -35,7 +35,8 @@ def pages(inputs: Mapping[str, Any], made: FlightPlan) -> list[Page]:
         f" overlap {made.overlap:.0%}, {len(made.each_flight)} of a battery each.",
         "",
         f"{made.way_home}.",
-        *(["", _anchored(made.origin), ""] if made.origin.residual_m is not None else []),
+        "",
+        *([_anchored(made.origin), ""] if made.origin.residual_m is not None else []),
         "| surface | area m² | covered | can be reached | of it in two photos | in 95 of 100 flights"
         " | measurable mm | stand-off m | mm/px | photos | not reached |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
