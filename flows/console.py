@@ -41,6 +41,9 @@ class StageLines:
             if event.outcome in ("started", "progress"):
                 self._show(event)
                 return
+            if event.outcome == "noted":
+                out.print(f"  [yellow]![/yellow] {_escape(event.detail)}")
+                return
             bar = self._bars.pop((event.stage, event.item), None)
             if bar is not None:
                 self._progress.remove_task(bar)

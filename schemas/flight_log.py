@@ -40,6 +40,7 @@ class FlightLog(Contract):
     shots: tuple[Shot, ...]
     errors: tuple[TrackError, ...]
     said: tuple[str, ...] = ()  # what the vehicle warned of in flight, each once
+    way_home: tuple[str, ...] = ()  # what was set for a failsafe's way home, and what is to be known of it
     missed: tuple[str, ...] = ()  # planned photos that the log has no shot of
     later_archives: tuple[File, ...] = ()  # of the plan's second and further flights
 
@@ -73,6 +74,7 @@ def joined(logs: Sequence[FlightLog]) -> FlightLog:
             for error in log.errors
         ),
         said=tuple(dict.fromkeys(text for log in logs for text in log.said)),
+        way_home=tuple(dict.fromkeys(text for log in logs for text in log.way_home)),
         missed=tuple(dict.fromkeys(photo for log in logs for photo in log.missed if photo not in shots)),
         later_archives=archives[1:],
     )

@@ -98,7 +98,7 @@ class FlightPlan(Contract):
             )
         return (
             f"A failsafe comes home through known air with RTL_ALT at {self.return_height_m:g} m"
-            f" ({100 * self.return_height_m:.0f} cm): set it before take-off"
+            f" ({100 * self.return_height_m:.0f} cm): `hairline fly` sets it, else set it before take-off"
         )
 
     @property

@@ -10,12 +10,13 @@ from typing import Any, Literal
 
 from tasks.lineage import Lineage
 
-Outcome = Literal["started", "progress", "ran", "cached", "failed", "will run"]
+Outcome = Literal["started", "progress", "noted", "ran", "cached", "failed", "will run"]
 
 
 @dataclass(frozen=True)
 class Event:
-    """What happened to a stage. `detail`: seconds it ran, why it will run, or what failed."""
+    """What happened to a stage. `detail`: seconds it ran, why it will run, what failed, or what is
+    to be known while it runs."""
 
     stage: str
     outcome: Outcome

@@ -282,6 +282,12 @@ def progress(fraction: float) -> None:
     ProgressArtifact.of(context).show(fraction)
 
 
+def note(text: str) -> None:
+    """Say something that people should know while the stage still runs; shown in the terminal."""
+    context = TaskRunContext.get()
+    _tell(Event(context.task.name.replace("-", "_") if context else "", "noted", detail=text))
+
+
 def publish(page: Page) -> None:
     """Make an artifact of a page, attached to the task or flow that runs now."""
     if page.markdown is not None:

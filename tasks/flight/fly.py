@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -10,11 +11,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from schemas.flight_plan import FlightPlan
 from schemas.mission import MissionItem
 from schemas.problem import BadInput
-from tasks.flight.link import Link, LinkLost
+from tasks.flight.link import REMEDY, Link, LinkLost
 from tasks.flight.mavlink_messages import MessageReader, vehicle_name
 from tasks.flight.place import Place
 from tasks.flight.recording import Fix, Recorder, Recording, archive
 from tasks.flight.upload import abandon_mission, upload_mission
+from tasks.flight.way_home import WayHome
 
 AUTO, GUIDED = 3, 4  # ArduCopter's modes
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
@@ -60,12 +62,20 @@ class Flight:
         self.off_home_m = max(plan.vehicle.clearance_m, LEAST_OFF_M)
         self._recorder: Recorder | None = None
         self._next_recorder: Recorder | None = None
+        self._way_home: WayHome | None = None
         link.on_message = self._on_message
 
     # -- on the ground ---------------------------------------------------------------------------------
 
     def prepare(self) -> str:
-        """Find the vehicle, check it, upload the mission; returns the vehicle's name. Raises BadInput."""
+        """Find the vehicle, check it, upload the mission, set its way home; its name. Raises BadInput."""
+        try:
+            return self._prepared()
+        except LinkLost:
+            what = f"the vehicle was not heard for {self.link.timeout_s:g} s, before it was armed"
+            raise BadInput(self.link.url, what, REMEDY) from None
+
+    def _prepared(self) -> str:
         heartbeat = self.link.find_vehicle()
         self.reader.source = self.link.source
         self._check_kind(heartbeat)
@@ -76,7 +86,13 @@ class Flight:
         if heartbeat.custom_mode == AUTO:  # where it stays after a flight, and no mission can be cleared
             self._set_mode(GUIDED)
         upload_mission(self.link, self.items)
+        self._way_home = WayHome(self.link, self.plan)
         return self.reader.recording.vehicle
+
+    @property
+    def way_home(self) -> tuple[str, ...]:
+        """What was changed of a failsafe's way home, and what is to be known of it."""
+        return tuple(self._way_home.told) if self._way_home else ()
 
     def _check_kind(self, heartbeat: Any) -> None:
         if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA or heartbeat.type not in COPTERS:
@@ -150,6 +166,8 @@ class Flight:
         except KeyboardInterrupt:
             raise FlightLost(self.reader.close(), interrupted=True) from None
         recording = self.reader.close()
+        self._recorder = None
+        self._give_back()
         if max((fix.height_m for fix in recording.fixes), default=0.0) < AIRBORNE_M:
             self._stand_down()
             raise self._problem("the vehicle armed but did not take off")
@@ -218,9 +236,15 @@ class Flight:
         try:
             if self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, attempts=3) == ACCEPTED:
                 self._set_mode(GUIDED)  # in AUTO no mission can be cleared
+            self._give_back()
         except LinkLost:
             return
         abandon_mission(self.link)
+
+    def _give_back(self) -> None:
+        if self._way_home is not None:
+            with suppress(LinkLost):
+                self._way_home.give_back()
 
     def _problem(self, what: str) -> BadInput:
         said = "; ".join(dict.fromkeys(text.strip() for _, text in self.reader.recording.said[-5:]))

@@ -12,7 +12,7 @@ from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
 from schemas.mission import mission_items
 from schemas.problem import BadInput
-from tasks.stage import progress, stage
+from tasks.stage import note, progress, stage
 
 if TYPE_CHECKING:
     from tasks.flight.fly import FlightLost
@@ -52,6 +52,7 @@ def flight_pages(inputs: Mapping[str, Any], log: FlightLog) -> Sequence[Page]:
     ]
     summary = (
         f"**{log.vehicle}**, {log.duration_s / 60:.1f} min, {len(log.shots)} shots, {len(log.missed)} missed"
+        + "".join(f"\n- way home: {text}" for text in log.way_home)
         + "".join(f"\n- the vehicle said: {text}" for text in log.said)
         + "".join(f"\n- not shot: {photo}" for photo in log.missed)
     )
@@ -76,6 +77,8 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
     with store.current().scratch() as folder, Link(connection, timeout_s) as link:
         flight = Flight(link, plan, items)
         vehicle = flight.prepare()
+        for text in flight.way_home:
+            note(text)
         path = folder / ARCHIVE
         try:
             with (
@@ -86,7 +89,8 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
         except FlightLost as lost:
             raise _cut_short(connection, timeout_s, lost, store.current().put(path)) from None
         recording.vehicle = vehicle
-        return _flight_log(recording, store.current().put(path), plan, connection)
+        log = _flight_log(recording, store.current().put(path), plan, connection)
+        return log.model_copy(update={"way_home": flight.way_home})
 
 
 @stage(pages=flight_pages)

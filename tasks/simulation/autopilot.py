@@ -16,6 +16,7 @@ from schemas.contract import Vector3
 from schemas.geodesy import GeoOrigin, turned
 from schemas.vehicle import Vehicle
 from tasks.simulation.mission_memory import MissionMemory
+from tasks.simulation.parameter_memory import ParameterMemory
 from tasks.simulation.trajectory import STEP_S, Flown, fly_mission
 
 SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
@@ -39,6 +40,8 @@ class Faults:
     drift_m: float = 0.0  # as far north of where it stood does it stand after arming
     failsafe_s: float | None = None  # the battery is low at this time of the flight: it goes home
     vanish_s: float | None = None  # the link ends at this time of the flight
+    in_metres: bool = False  # its parameters are called as from ArduCopter 4.7 on
+    parameters: tuple[tuple[str, float], ...] = ()  # other than as delivered
 
 
 class Vanished(Exception):
@@ -63,6 +66,7 @@ class Autopilot:
         self._send_bytes = send
         self._loss = np.random.default_rng([seed, 0x6C6F7373])
         self.memory = MissionMemory(self.mav, self.send, origin, home_m, faults.lose_last_item)
+        self.parameters = ParameterMemory(self.mav, self.send, faults.in_metres, faults.parameters)
         self.armed, self.mode = False, STABILIZE
         self._refused_modes = 0
 
@@ -73,7 +77,8 @@ class Autopilot:
             if message.get_type() == "BAD_DATA" or self._lost():
                 continue
             name = f"on_{message.get_type().lower()}"
-            handler = getattr(self.memory, name, None) or getattr(self, name, None)
+            memories = (self.memory, self.parameters, self)
+            handler = next((getattr(one, name) for one in memories if hasattr(one, name)), None)
             if handler is not None and getattr(message, "target_system", SYSTEM) == SYSTEM:
                 handler(message)
 

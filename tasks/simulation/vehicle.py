@@ -47,6 +47,7 @@ def start_vehicle(plan: FlightPlan, seed: int, faults: Faults | None = None) -> 
     for moment in ("vanish_s", "failsafe_s"):
         if (at_s := getattr(faults, moment)) is not None:
             command += [f"--{moment.replace('_', '-')}", str(at_s)]
+    command += [f"--param={name}={value}" for name, value in faults.parameters]
     root = str(Path(__file__).parents[2])
     path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     process = subprocess.Popen(
@@ -70,7 +71,7 @@ def _url(process: subprocess.Popen[bytes]) -> str:
     return url
 
 
-_SWITCHES = ("silent", "refuse_arm", "lose_last_item")
+_SWITCHES = ("silent", "refuse_arm", "lose_last_item", "in_metres")
 
 
 def main() -> None:
@@ -88,6 +89,7 @@ def main() -> None:
     parser.add_argument("--settling", type=int, default=0, help="refuse as many changes of mode")
     parser.add_argument("--home-off-m", type=float, default=0.0, help="heights count from above the ground")
     parser.add_argument("--drift-m", type=float, default=0.0, help="it stands farther north after arming")
+    parser.add_argument("--param", action="append", default=[], help="NAME=VALUE, other than as delivered")
     for switch in _SWITCHES:
         parser.add_argument(f"--{switch.replace('_', '-')}", action="store_true")
     options = parser.parse_args()
@@ -106,6 +108,8 @@ def main() -> None:
         drift_m=options.drift_m,
         failsafe_s=options.failsafe_s,
         vanish_s=options.vanish_s,
+        in_metres=options.in_metres,
+        parameters=tuple((name, float(value)) for name, value in (p.split("=") for p in options.param)),
     )
     with socket.create_server(("127.0.0.1", options.port)) as server:
         print(f"tcp:127.0.0.1:{server.getsockname()[1]}", flush=True)

@@ -19,7 +19,7 @@ from schemas.flight_plan import FlightPlan
 from schemas.mission import mission_items
 from schemas.problem import BadInput
 from tasks.flight.fly import AUTO, Flight
-from tasks.flight.link import Link
+from tasks.flight.link import Link, LinkLost
 from tasks.flight.recording import archive
 from tasks.flight.task import FlightCutShort, convert, flight_pages, fly, import_log
 from tasks.flight.upload import clear_mission, read_back
@@ -86,7 +86,7 @@ def test_a_vehicle_that_refuses_to_start_keeps_no_mission(
 
 def test_the_archive_gives_the_flight_back(log: FlightLog) -> None:
     again = import_log.bare(log.archive, "flight.mcap", PLAN)
-    assert again == log
+    assert again == log.model_copy(update={"way_home": ()})  # settings are no part of a flight
 
 
 def test_a_truncated_archive_gives_what_it_has(log: FlightLog, tmp_path: Path) -> None:
@@ -110,6 +110,18 @@ def test_a_vehicle_that_refuses_to_arm_says_why_and_keeps_no_mission() -> None:
         with Link(url, 5.0) as link:
             link.find_vehicle()
             assert read_back(link) == ()
+
+
+def test_a_link_that_breaks_before_take_off_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks(link: Link, plan: FlightPlan) -> None:
+        raise LinkLost
+
+    monkeypatch.setattr("tasks.flight.fly.WayHome", breaks)
+    with (
+        start_vehicle(PLAN, 1) as url,
+        pytest.raises(BadInput, match="not heard for 5 s, before it was armed"),
+    ):
+        fly.bare(PLAN, "1", url, 5.0)
 
 
 def test_a_vehicle_just_switched_on_is_waited_for() -> None:
@@ -161,7 +173,8 @@ def test_what_the_vehicle_warned_of_stands_beside_the_photos_that_lack() -> None
     assert cut.shots
     assert cut.missed
     assert cut.said == ("Battery 1 is low 13.20V used 2500 mAh",)
-    assert import_log.bare(cut.archive, "flight.mcap", PLAN) == cut
+    again = import_log.bare(cut.archive, "flight.mcap", PLAN)
+    assert again == cut.model_copy(update={"way_home": ()})
     assert "the vehicle said: Battery 1 is low" in (flight_pages({}, cut)[0].markdown or "")
 
 
