@@ -3,7 +3,7 @@ of it is then touched for the first time, which took a third of the network's ti
 
 import ctypes
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Any
 
@@ -24,6 +24,12 @@ def reused() -> Iterator[None]:
     finally:
         mallopt(MMAP_MAX, USUAL_MMAP_MAX)
         mallopt(MMAP_THRESHOLD, LARGE)  # where glibc's own adjustment ends, which stops once anything is set
+
+
+def given_back() -> None:
+    """Free memory goes back to the system, where what follows is of another kind."""
+    with suppress(OSError, TypeError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 @cache

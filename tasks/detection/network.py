@@ -1,12 +1,13 @@
 """A crack's probability at every pixel, by a small network that OpenCV runs.
 
 Ours lies beside this file (hairline.onnx; hairline.md says what it learned from and how well it does). Any
-other takes its place that has the same ends: (1, 3, H, W) RGB in 0..1 to (1, 1, H, W) logits, for any H and W
-that are multiples of STRIDE.
+other takes its place that has the same ends: (1, 3, H, W) RGB in 0..1 to (1, 1, H, W) logits, or to
+(1, 4, H/2, W/2), those of each 2×2 pixels as four channels, for any H and W that are multiples of STRIDE.
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,20 +18,24 @@ from numba import njit
 
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
-from tasks.detection.heap import reused
+from tasks.detection.heap import given_back, reused
 from tasks.detection.sauvola import Mask
-from tasks.detection.windows import Window, whole_of, windows
+from tasks.detection.windows import Pieces, Window, grid, whole_of
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
-SHA256 = "924ced1ebdc90df366caacacd4e94f32edfb3c576049bc6815dd73518b50fbb1"
+SHA256 = "7299bfc42ef35e8f6708f0efef93bb0dd2c05b24d918d8aa20855a9be7f6fc83"
 STRIDE = 32
-OCTAVES = (2, 1)  # our network is asked at 1 / 2^octave of the size too
-SEEN_PX = 6_000_000  # at once: 120 bytes each (measured)
+OCTAVES = (3, 2, 1)  # our network is asked at 1 / 2^octave of the size too
+SEEN_PX = 6_850_000  # at once, 120 bytes each (measured): half of a photo of 12 MP and its halo
 HALO_PX = 224  # of an octave: what lies further away changes a probability by 1/255 at most (measured)
-STEP_PX = STRIDE << 2  # windows begin at multiples of it: so do their pixels at each octave
-BAND_PX = 1024  # rows of an image that are read and reduced at once
-HALF = 0.5  # what its answer at half size counts where a crack is wide enough to be seen at quarter size
+STEP_PX = STRIDE << OCTAVES[0]  # windows begin at multiples of it: so do their pixels at each octave
+BAND_PX = 6 << 20  # pixels of an image that are read and reduced at once, unless it is wider than that
+LEAST_ROWS = 256  # of such a band
+# What its answer at half size counts where a crack is wide enough to be seen at quarter size: where that is
+# surer of the crack than the one at full size, to which a wide crack looks like a stain, and where less sure.
+SURER, LESS_SURE = 0.75, 0.5
+MANY = 16  # windows, from which on it pays to ask for all memory at once, and to give it back
 FILL_PX = 63  # what is not known is filled from this far around
 
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
@@ -51,7 +56,7 @@ USUAL_LIMITS = Limits(128, 179)  # of a guest: more likely crack than not; nobod
 class Model(NamedTuple):
     content: bytes  # ONNX
     name: str  # for messages
-    at_smaller_sizes: bool = False  # ask it again at half and quarter size, where it sees wide cracks whole
+    at_smaller_sizes: bool = False  # ask it again at half size and less, where it sees wide cracks whole
     limits: Limits = USUAL_LIMITS
 
 
@@ -77,13 +82,20 @@ class Answer(NamedTuple):
 
     def at(self, window: Window) -> Logits:
         """Logits of a window inside, at full size."""
+        return self._at(window, np.asarray)
+
+    def sees_at(self, window: Window) -> Logits:
+        """The probabilities of a crack there, at full size."""
+        return self._at(window, _probable)
+
+    def _at(self, window: Window, of: Callable[[Logits], Logits]) -> Logits:
         top, bottom = window.top - self.top_px, window.bottom - self.top_px
         left, right = window.left - self.left_px, window.right - self.left_px
         if self.octave == 0:
-            return self.logit[top:bottom, left:right]
+            return of(self.logit[top:bottom, left:right])
         step = 1 << self.octave
         y, x = max(0, top // step - 1), max(0, left // step - 1)  # one more on each side, to lie between
-        part = self.logit[y : -(-bottom // step) + 1, x : -(-right // step) + 1]
+        part = of(self.logit[y : -(-bottom // step) + 1, x : -(-right // step) + 1])
         size = part.shape[1] * step, part.shape[0] * step
         whole = cv2.resize(part, size, interpolation=cv2.INTER_LINEAR)
         return np.asarray(whole[top - y * step : bottom - y * step, left - x * step : right - x * step])
@@ -101,35 +113,59 @@ def probabilities(
     raster: Raster, model: Model, on_progress: Progress | None = None
 ) -> Iterator[tuple[Window, Probability]]:
     """The same of an image of any size, window by window; those where nothing is known are left out."""
-    net = _read(model)
-    image = whole_of(raster)
+    image, octaves = whole_of(raster), OCTAVES if model.at_smaller_sizes else ()
+    rows, columns = grid(image, HALO_PX, SEEN_PX, STEP_PX)
+    net, many = _Net(model), len(rows) * len(columns) > MANY
     done_px = 0
     with reused():
-        for window, wider in _windows(net, raster, image, OCTAVES if model.at_smaller_sizes else (), model):
+        if many:
+            net.logits(np.zeros((_longest(rows), _longest(columns), 3), np.uint8))
+        for window, wider in _windows(net, raster, rows, columns, octaves):
             valid = raster.valid(*window)
             if valid.any():
-                logit = _answer(net, raster, window, 0, model).at(window)
-                if wider:
-                    quarter, half = (answer.at(window) for answer in wider)
-                    _heed(logit, half, quarter)
-                yield window, _of_logits(logit, valid)
+                yield window, _of_logits(_heeded((*wider, _answer(net, raster, window, 0)), window), valid)
             done_px += window.area_px
             if on_progress is not None:
                 on_progress(done_px / image.area_px)
+    del net
+    if many:
+        given_back()
+
+
+def _heeded(answers: tuple[Answer, ...], window: Window) -> Logits:
+    """Logits of the last, largest answer, which heeds that of half its size as far as the one of a quarter
+    sees a crack; as does that one, where there are smaller ones."""
+    heeded = answers[min(1, len(answers) - 1)].at(window)
+    for quarter, full in zip(answers, answers[2:], strict=False):
+        logit = full.at(window)
+        _heed(logit, heeded, quarter.sees_at(window))
+        heeded = logit
+    return heeded
+
+
+def _longest(pieces: Pieces) -> int:
+    return max(end - start for start, end in pieces) + 2 * HALO_PX
 
 
 def _windows(
-    net: Any, raster: Raster, of: Window, octaves: tuple[int, ...], model: Model
+    net: "_Net", raster: Raster, rows: Pieces, columns: Pieces, octaves: tuple[int, ...]
 ) -> Iterator[tuple[Window, tuple[Answer, ...]]]:
-    """The windows of `of`, each with what the network says of a wider one at each of the octaves."""
-    octave = octaves[0] if octaves else 0
-    for window in windows(of, whole_of(raster), HALO_PX << octave, SEEN_PX << 2 * octave, STEP_PX):
-        if not octaves:
-            yield window, ()
-        elif raster.valid(*window).any():
-            answer = _answer(net, raster, window, octave, model)
-            for part, wider in _windows(net, raster, window, octaves[1:], model):
+    """Every row with every column, each with what the network says around it at each of the octaves: once
+    for each 2^octave × 2^octave windows, which at that size have as many pixels as one has at full size."""
+    if not octaves:
+        yield from ((Window(*row, *column), ()) for row in rows for column in columns)
+        return
+    together = 1 << octaves[0]
+    for high, wide in product(_lots(rows, together), _lots(columns, together)):
+        if any(raster.valid(*row, *column).any() for row in high for column in wide):
+            window = Window(high[0][0], high[-1][1], wide[0][0], wide[-1][1])
+            answer = _answer(net, raster, window, octaves[0])
+            for part, wider in _windows(net, raster, high, wide, octaves[1:]):
                 yield part, (answer, *wider)
+
+
+def _lots(pieces: Pieces, size: int) -> list[Pieces]:
+    return [pieces[k : k + size] for k in range(0, len(pieces), size)]
 
 
 @njit(cache=True, nogil=True)
@@ -139,12 +175,22 @@ def _sigmoid(logit: np.float32) -> np.float32:
 
 
 @njit(cache=True, nogil=True)
-def _heed(logit: Logits, half: Logits, quarter: Logits) -> None:
-    """In place: what the network answers at half size, as far as it sees a crack at quarter size."""
+def _probable(logit: Logits) -> Logits:
+    p = np.empty(logit.shape, np.float32)
     for y in range(logit.shape[0]):
         for x in range(logit.shape[1]):
-            share = np.float32(HALF) * _sigmoid(quarter[y, x])
-            logit[y, x] += share * (half[y, x] - logit[y, x])
+            p[y, x] = _sigmoid(logit[y, x])
+    return p
+
+
+@njit(cache=True, nogil=True)
+def _heed(logit: Logits, half: Logits, quarter: Logits) -> None:
+    """In place: what the network answers at half size, as far as it sees a crack (0..1) at quarter size."""
+    for y in range(logit.shape[0]):
+        for x in range(logit.shape[1]):
+            more = half[y, x] - logit[y, x]
+            share = np.float32(SURER if more > 0 else LESS_SURE)
+            logit[y, x] += share * quarter[y, x] * more
 
 
 @njit(cache=True, nogil=True)
@@ -157,16 +203,17 @@ def _of_logits(logit: Logits, valid: Mask) -> Probability:
     return p
 
 
-def _answer(net: Any, raster: Raster, window: Window, octave: int, model: Model) -> Answer:
+def _answer(net: "_Net", raster: Raster, window: Window, octave: int) -> Answer:
     seen = window.grown(HALO_PX << octave, whole_of(raster))
-    return Answer(_logits(net, _reduced(raster, seen, octave), model), seen.top, seen.left, octave)
+    return Answer(net.logits(_reduced(raster, seen, octave)), seen.top, seen.left, octave)
 
 
 def _reduced(raster: Raster, window: Window, octave: int) -> Pixels:
     """(H, W, 3) of a window at 1 / 2^octave of its size, what is unknown filled; read band by band."""
     bands: list[Pixels] = []
-    for top in range(window.top, window.bottom, BAND_PX):
-        bottom = min(window.bottom, top + BAND_PX)
+    rows = max(LEAST_ROWS, BAND_PX // (window.right - window.left) // STRIDE * STRIDE)
+    for top in range(window.top, window.bottom, rows):
+        bottom = min(window.bottom, top + rows)
         y0, y1 = max(window.top, top - FILL_PX), min(window.bottom, bottom + FILL_PX)
         read = Window(y0, y1, window.left, window.right)
         rgb = filled(raster.rgb(*read), raster.valid(*read))[top - y0 : bottom - y0]
@@ -184,13 +231,41 @@ def filled(rgb: Pixels, valid: Mask) -> Pixels:
         return rgb
     if not valid.any():
         return np.full_like(rgb, 128)
+    weight, unknown = valid.astype(np.float32), ~valid
+    known = _summed(weight)[unknown]
+    whole = rgb.copy()
+    for channel, far in enumerate(rgb[valid].mean(axis=0)):
+        near = _summed(rgb[..., channel] * weight)[unknown] / np.maximum(known, 1.0)
+        whole[..., channel][unknown] = np.rint(np.where(known > 0.5, near, far)).astype(np.uint8)
+    return whole
+
+
+def _summed(of: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     size = (FILL_PX, FILL_PX)
-    weight = valid.astype(np.float32)
-    known = cv2.boxFilter(weight, -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
-    summed = cv2.boxFilter(rgb * weight[..., None], -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
-    far = rgb[valid].mean(axis=0)
-    near = np.where(known[..., None] > 0.5, summed / np.maximum(known, 1.0)[..., None], far)
-    return np.where(valid[..., None], rgb, np.rint(near)).astype(np.uint8)
+    summed = cv2.boxFilter(of, -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return np.asarray(summed, np.float32)
+
+
+class _Net:
+    def __init__(self, model: Model) -> None:
+        self.model, self.net = model, _read(model)
+
+    def logits(self, rgb: Pixels) -> Logits:
+        """(H, W) of (H, W, 3)."""
+        height, width = rgb.shape[:2]
+        seen = cv2.copyMakeBorder(rgb, 0, -height % STRIDE, 0, -width % STRIDE, cv2.BORDER_REFLECT_101)
+        rows, columns = seen.shape[:2]
+        try:
+            self.net.setInput(cv2.dnn.blobFromImage(seen, 1.0 / 255.0))
+            logit = np.asarray(self.net.forward(), dtype=np.float32)
+        except cv2.error as problem:
+            what = f"does not run on a tile of an image ({_first_words(problem)})"
+            raise _unfit(self.model, what) from None
+        if logit.shape == (1, 4, rows // 2, columns // 2):
+            return _unfolded(logit[0])[:height, :width]
+        if logit.shape != (1, 1, rows, columns):
+            raise _unfit(self.model, f"answers a tile of {(rows, columns)} px with the shape {logit.shape}")
+        return logit[0, 0, :height, :width]
 
 
 def _read(model: Model) -> Any:
@@ -200,18 +275,16 @@ def _read(model: Model) -> Any:
         raise _unfit(model, f"cannot be read as an ONNX network ({_first_words(problem)})") from None
 
 
-def _logits(net: Any, rgb: Pixels, model: Model) -> Logits:
-    """(H, W) of (H, W, 3)."""
-    height, width = rgb.shape[:2]
-    seen = cv2.copyMakeBorder(rgb, 0, -height % STRIDE, 0, -width % STRIDE, cv2.BORDER_REFLECT_101)
-    try:
-        net.setInput(cv2.dnn.blobFromImage(seen, 1.0 / 255.0))
-        logit = np.asarray(net.forward(), dtype=np.float32)
-    except cv2.error as problem:
-        raise _unfit(model, f"does not run on a tile of an image ({_first_words(problem)})") from None
-    if logit.shape != (1, 1, *seen.shape[:2]):
-        raise _unfit(model, f"answers a tile of {seen.shape[:2]} px with the shape {logit.shape}")
-    return logit[0, 0, :height, :width]
+@njit(cache=True, nogil=True)
+def _unfolded(logit: Logits) -> Logits:
+    """(2 H, 2 W) of (4, H, W): as ONNX's DepthToSpace, which OpenCV takes ten times as long for."""
+    _, height, width = logit.shape
+    whole = np.empty((2 * height, 2 * width), np.float32)
+    for y in range(height):
+        for x in range(width):
+            whole[2 * y, 2 * x], whole[2 * y, 2 * x + 1] = logit[0, y, x], logit[1, y, x]
+            whole[2 * y + 1, 2 * x], whole[2 * y + 1, 2 * x + 1] = logit[2, y, x], logit[3, y, x]
+    return whole
 
 
 def _unfit(model: Model, what: str) -> BadInput:

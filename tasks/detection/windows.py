@@ -13,6 +13,7 @@ STEP_PX = 64  # whose windows begin at multiples of it
 WORKERS = 2  # windows at a time: bounds the memory
 
 T = TypeVar("T")
+Pieces = tuple[tuple[int, int], ...]  # start and end of each
 
 
 class Window(NamedTuple):
@@ -53,7 +54,7 @@ def by_windows(
     OpenCV and numpy free the interpreter, so that windows run at the same time; results come in order."""
     image = whole_of(raster)
     most_px = max(MOST_PX, 2 * (STEP_PX + 2 * halo_px) ** 2)
-    parts = list(windows(image, image, halo_px, most_px, STEP_PX))
+    parts = list(windows(image, halo_px, most_px, STEP_PX))
     results: list[T] = []
     with ThreadPoolExecutor(WORKERS) as pool:
         for done in pool.map(lambda part: work(part, part.grown(halo_px, image)), parts):
@@ -63,33 +64,50 @@ def by_windows(
     return results
 
 
-def windows(of: Window, image: Window, halo_px: int, most_px: int, step_px: int) -> Iterator[Window]:
-    """Row by row; sides are multiples of step_px, but at the end. Of the cuts whose windows have at most
-    most_px pixels each, halos included, the one that sees the fewest pixels in all."""
-    rows = list(_cuts(of.top, of.bottom, image.bottom, halo_px, step_px))
-    columns = list(_cuts(of.left, of.right, image.right, halo_px, step_px))
-    _, high, wide = min(
-        (row.seen_px * column.seen_px, -row.side_px, -column.side_px)
+def windows(image: Window, halo_px: int, most_px: int, step_px: int) -> Iterator[Window]:
+    """Row by row: every row of the grid with every column."""
+    rows, columns = grid(image, halo_px, most_px, step_px)
+    for top, bottom in rows:
+        for left, right in columns:
+            yield Window(top, bottom, left, right)
+
+
+def grid(image: Window, halo_px: int, most_px: int, step_px: int) -> tuple[Pieces, Pieces]:
+    """Top and bottom of each row, left and right of each column; all but the ends are multiples of step_px.
+    Of the cuts whose windows have at most most_px pixels each, halos included, one that sees the fewest
+    pixels in all."""
+    rows = list(_cuts(image.bottom, halo_px, step_px))
+    columns = list(_cuts(image.right, halo_px, step_px))
+    _, _, high, wide = min(
+        (row.seen_px * column.seen_px, row.longest_px * column.longest_px, row.pieces, column.pieces)
         for row, column in product(rows, columns)
         if row.longest_px * column.longest_px <= most_px
     )
-    for top in range(of.top, of.bottom, -high):
-        for left in range(of.left, of.right, -wide):
-            yield Window(top, min(of.bottom, top - high), left, min(of.right, left - wide))
+    return high, wide
 
 
 class _Cut(NamedTuple):
-    side_px: int
+    pieces: Pieces
     longest_px: int  # of its pieces, with their halos
     seen_px: int  # of all its pieces together
 
 
-def _cuts(start: int, end: int, image_end: int, halo_px: int, step_px: int) -> Iterator[_Cut]:
-    """Ways to cut start..end of 0..image_end into pieces of one side."""
-    steps = -(-(end - start) // step_px)
-    for side in sorted({step_px * -(-steps // pieces) for pieces in range(1, steps + 1)}):
-        seen = [
-            min(image_end, end + halo_px, at + side + halo_px) - max(0, at - halo_px)
-            for at in range(start, end, side)
-        ]
-        yield _Cut(side, max(seen), sum(seen))
+def _cuts(end: int, halo_px: int, step_px: int) -> Iterator[_Cut]:
+    """For each number of pieces that 0..end can be cut into, the cut whose longest is shortest. Pieces at an
+    end have one halo only, and are longer for it: all see about the same."""
+
+    def seen_px(at: int, stop: int) -> int:
+        return min(end, stop + halo_px) - max(0, at - halo_px)
+
+    fewest, least_px = 0, step_px + 2 * halo_px
+    for room_px in range(least_px, max(least_px, end) + step_px, step_px):
+        pieces, at = [], 0
+        while at < end:
+            stop = (max(0, at - halo_px) + room_px - halo_px) // step_px * step_px
+            stop = end if seen_px(at, end) <= room_px else min(stop, end)
+            pieces.append((at, stop))
+            at = stop
+        if fewest == 0 or len(pieces) < fewest:
+            fewest = len(pieces)
+            seen = [seen_px(*piece) for piece in pieces]
+            yield _Cut(tuple(pieces), max(seen), sum(seen))

@@ -109,7 +109,7 @@ def test_windows_give_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> N
     valid = np.ones((1000, 2000), dtype=bool)
     valid[400:600, 900:1150] = False
     whole = probability(ArrayRaster(rgb, valid), our_model()).astype(int)
-    monkeypatch.setattr(network, "SEEN_PX", 400_000)
+    monkeypatch.setattr(network, "SEEN_PX", 500_000)
     done: list[float] = []
     parts = probability(ArrayRaster(rgb, valid), our_model(), done.append).astype(int)
     assert (whole > 200).any() and len(done) > 4 and done == sorted(done) and done[-1] == 1.0
