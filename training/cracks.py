@@ -9,7 +9,7 @@ from tasks.simulation.crack import CrackShape
 STEP_PX = 1.0  # between the points of a crack
 SUPERSAMPLED = 8  # of the truth, along each axis
 VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
-SMOOTH = 0.15  # share of cracks without roughness
+SMOOTH = 0.3  # share of cracks without roughness
 # Shares of the heading's roughness at each correlation length in pixels: a crack goes around grains of every
 # size. Chords of 8, 16, 32 and 64 px turn by 21, 25, 27 and 33° RMS with branches; real ones by 19 to 26°.
 BENDS_PX = {3.0: 1.7, 10.0: 0.9, 30.0: 0.4, 100.0: 0.3}

@@ -24,7 +24,7 @@ from tasks.detection.windows import Pieces, Window, grid, whole_of
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
-SHA256 = "7299bfc42ef35e8f6708f0efef93bb0dd2c05b24d918d8aa20855a9be7f6fc83"
+SHA256 = "fc4dba80c0da6c3d07655731562c14f8c8ddcac55e21920963fad4ede64d692d"
 STRIDE = 32
 OCTAVES = (3, 2, 1)  # our network is asked at 1 / 2^octave of the size too
 SEEN_PX = 6_850_000  # at once, 120 bytes each (measured): half of a photo of 12 MP and its halo
