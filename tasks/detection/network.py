@@ -35,7 +35,7 @@ LEAST_ROWS = 256  # of such a band
 # What its answer at half size counts where a crack is wide enough to be seen at quarter size: where that is
 # surer of the crack than the one at full size, to which a wide crack looks like a stain, and where less sure.
 SURER, LESS_SURE = 0.75, 0.5
-MANY = 16  # windows, from which on it pays to ask for all memory at once, and to give it back
+MANY = 16  # windows: above, memory is asked for at once and given back at the end, which costs one window
 FILL_PX = 63  # what is not known is filled from this far around
 
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
@@ -118,7 +118,7 @@ def probabilities(
     net, many = _Net(model), len(rows) * len(columns) > MANY
     done_px = 0
     with reused():
-        if many:
+        if many:  # memory that grows from window to window has holes
             net.logits(np.zeros((_longest(rows), _longest(columns), 3), np.uint8))
         for window, wider in _windows(net, raster, rows, columns, octaves):
             valid = raster.valid(*window)
@@ -144,7 +144,9 @@ def _heeded(answers: tuple[Answer, ...], window: Window) -> Logits:
 
 
 def _longest(pieces: Pieces) -> int:
-    return max(end - start for start, end in pieces) + 2 * HALO_PX
+    """Of the pieces with their halos, in pixels."""
+    (_, end) = pieces[-1]
+    return max(min(end, stop + HALO_PX) - max(0, start - HALO_PX) for start, stop in pieces)
 
 
 def _windows(

@@ -71,6 +71,11 @@ def _url(process: subprocess.Popen[bytes]) -> str:
     return url
 
 
+def _setting(text: str) -> tuple[str, float]:
+    name, value = text.split("=")
+    return name, float(value)
+
+
 _SWITCHES = ("silent", "refuse_arm", "lose_last_item", "in_metres")
 
 
@@ -89,7 +94,9 @@ def main() -> None:
     parser.add_argument("--settling", type=int, default=0, help="refuse as many changes of mode")
     parser.add_argument("--home-off-m", type=float, default=0.0, help="heights count from above the ground")
     parser.add_argument("--drift-m", type=float, default=0.0, help="it stands farther north after arming")
-    parser.add_argument("--param", action="append", default=[], help="NAME=VALUE, other than as delivered")
+    parser.add_argument(
+        "--param", action="append", default=[], type=_setting, help="NAME=VALUE, other than as delivered"
+    )
     for switch in _SWITCHES:
         parser.add_argument(f"--{switch.replace('_', '-')}", action="store_true")
     options = parser.parse_args()
@@ -109,7 +116,7 @@ def main() -> None:
         failsafe_s=options.failsafe_s,
         vanish_s=options.vanish_s,
         in_metres=options.in_metres,
-        parameters=tuple((name, float(value)) for name, value in (p.split("=") for p in options.param)),
+        parameters=tuple(options.param),
     )
     with socket.create_server(("127.0.0.1", options.port)) as server:
         print(f"tcp:127.0.0.1:{server.getsockname()[1]}", flush=True)
