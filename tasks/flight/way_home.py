@@ -75,6 +75,6 @@ class WayHome:
             home.append(f"{FENCE[1]} {FENCE_COMES_HOME[1]}")
         if home:
             self.told.append(
-                f"{', '.join(home)}: a failsafe would fly straight home, and at no height is that way known"
-                " to be free: let it land, or fly back the way it came (SmartRTL)"
+                f"The vehicle has {', '.join(home)}: that failsafe flies straight home, and at no height is"
+                " that way known to be free; let it land, or fly back the way it came (SmartRTL)"
             )

@@ -69,9 +69,12 @@ def test_another_way_home_than_was_checked_is_told() -> None:
 @pytest.mark.parametrize(
     ("parameters", "told"),
     [
-        ((), "FS_THR_ENABLE 1: a failsafe would fly straight home"),
-        ((("FS_THR_ENABLE", 3.0), ("BATT_FS_LOW_ACT", 2.0)), "BATT_FS_LOW_ACT 2: a failsafe"),
-        ((("FS_THR_ENABLE", 5.0), ("FENCE_ENABLE", 1.0)), "FENCE_ACTION 1: a failsafe"),
+        ((), "The vehicle has FS_THR_ENABLE 1: that failsafe"),
+        (
+            (("FS_THR_ENABLE", 3.0), ("BATT_FS_LOW_ACT", 2.0)),
+            "The vehicle has BATT_FS_LOW_ACT 2: that failsafe",
+        ),
+        ((("FS_THR_ENABLE", 5.0), ("FENCE_ENABLE", 1.0)), "The vehicle has FENCE_ACTION 1: that failsafe"),
         ((("FS_THR_ENABLE", 5.0),), None),
     ],
 )
@@ -103,6 +106,6 @@ def test_a_flight_says_what_it_set(plan: FlightPlan) -> None:
             assert height_of(link) == ("RTL_ALT", 1500.0)
     (page,) = (page for page in flight_pages({}, log) if page.key == "flight")
     assert page.markdown is not None
-    told = "RTL_ALT set from 1500 to 850" if plan is PLAN else "FS_THR_ENABLE 1: a failsafe would"
+    told = "RTL_ALT set from 1500 to 850" if plan is PLAN else "The vehicle has FS_THR_ENABLE 1"
     assert f"- way home: {told}" in page.markdown
     assert len(log.way_home) == (2 if plan is PLAN else 1)
