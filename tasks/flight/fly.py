@@ -165,12 +165,14 @@ class Flight:
             raise FlightLost(self.reader.close()) from None
         except KeyboardInterrupt:
             raise FlightLost(self.reader.close(), interrupted=True) from None
+        landed = not self.reader.armed and bool(self.reader.recording.armed_s)
         recording = self.reader.close()
         self._recorder = None
-        self._give_back()
         if max((fix.height_m for fix in recording.fixes), default=0.0) < AIRBORNE_M:
             self._stand_down()
             raise self._problem("the vehicle armed but did not take off")
+        if landed:
+            self._give_back()
         return recording
 
     def _arm(self, recorder: Recorder) -> None:
@@ -232,11 +234,12 @@ class Flight:
                 return
 
     def _stand_down(self) -> None:
-        """On the ground, after a failure: motors off, no mission left. In the air neither is obeyed."""
+        """On the ground, after a failure: motors off, its own way home, no mission left. In the air the first
+        is not obeyed, and the plan's way home is needed."""
         try:
             if self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, attempts=3) == ACCEPTED:
                 self._set_mode(GUIDED)  # in AUTO no mission can be cleared
-            self._give_back()
+                self._give_back()
         except LinkLost:
             return
         abandon_mission(self.link)

@@ -116,6 +116,20 @@ def test_windows_give_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> N
     assert np.abs(parts - whole).max() <= 6 and (np.abs(parts - whole) > 1).mean() < 1e-3
 
 
+def test_a_size_heeds_the_next_smaller_one_where_that_sees_more_and_less() -> None:
+    logit = np.zeros((1, 4), np.float32)
+    half = np.array([[4.0, -4.0, 4.0, -4.0]], np.float32)
+    network._heed(logit, half, np.array([[1.0, 1.0, 0.5, 0.0]], np.float32))
+    assert logit.tolist() == [[3.0, -2.0, 1.5, 0.0]]
+
+
+def test_four_channels_are_the_pixels_of_two_by_two() -> None:
+    """As ONNX's DepthToSpace and PyTorch's PixelShuffle have it."""
+    four = np.arange(24, dtype=np.float32).reshape(4, 2, 3)
+    shuffled = four.reshape(2, 2, 2, 3).transpose(2, 0, 3, 1).reshape(4, 6)
+    assert network._unfolded(four).tolist() == shuffled.tolist()
+
+
 def test_the_number_of_threads_changes_nothing() -> None:
     rgb = rough(300, 400)
     with_crack(rgb, 150, 3, 0.6, 10, 390)

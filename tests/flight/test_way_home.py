@@ -1,12 +1,16 @@
 """A failsafe's way home on the simulated vehicle, before and after a flight."""
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from schemas.flight_plan import FlightPlan
+from schemas.mission import mission_items
+from tasks.flight.fly import Flight
 from tasks.flight.link import Link
 from tasks.flight.parameters import read_parameters, set_parameter
 from tasks.flight.task import flight_pages, fly
-from tasks.flight.way_home import WayHome
+from tasks.flight.way_home import PRESUMED, WayHome
+from tasks.planning.way_home import CONE
 from tasks.simulation.autopilot import Faults
 from tasks.simulation.vehicle import start_vehicle
 from tests.flight.wall_plan import wall_plan
@@ -86,6 +90,24 @@ def test_failsafes_that_come_straight_home_are_told_where_no_height_is_free(
         found = WayHome(link, NOWHERE).told
         assert len(found) == (told is not None)
         assert told is None or found[0].startswith(told)
+
+
+@pytest.mark.parametrize(("disarms", "height"), [(True, 1500.0), (False, 850.0)])
+def test_a_vehicle_that_does_not_disarm_may_fly_and_keeps_the_plan_s_height(
+    disarms: bool, height: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with start_vehicle(PLAN, 1) as url, Link(url, 5.0) as link:
+        flight = Flight(link, PLAN, mission_items(PLAN))
+        flight.prepare()
+        denied = mavlink.MAV_RESULT_FAILED
+        if not disarms:
+            monkeypatch.setattr(link, "command", lambda command, *params, **how: denied)
+        flight._stand_down()
+        assert height_of(link) == ("RTL_ALT", height)
+
+
+def test_the_way_home_is_checked_for_the_cone_that_the_plan_presumes() -> None:
+    assert PRESUMED[("RTL_CONE_SLOPE",)] == CONE
 
 
 def test_an_unknown_parameter_is_not_waited_for_without_end() -> None:
