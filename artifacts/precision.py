@@ -8,7 +8,7 @@ FINEST_STATED_MM = 0.01
 
 def millimetres(value_mm: float | None, sigma_mm: float | None = None, at_most: bool = False) -> str:
     """A length or width, "1.3 ± 0.1" or "≤ 0.4": σ to one digit (two where it begins with 1), and the
-    value to the same place, 0.1 mm at the finest; 0.01 mm where σ is below 0.05 mm. "–" for None."""
+    value to the same place, 0.1 mm at the finest; 0.01 mm where σ is below that. "–" for None."""
     if value_mm is None:
         return "–"
     if sigma_mm is None or sigma_mm <= 0:
@@ -26,7 +26,7 @@ def _last_place(sigma_mm: float) -> int:
     place = math.floor(math.log10(sigma_mm))
     if sigma_mm / 10.0**place < 1.95:
         place -= 1
-    finest = FINEST_MM if sigma_mm >= 0.05 else FINEST_STATED_MM
+    finest = FINEST_MM if sigma_mm >= FINEST_MM else FINEST_STATED_MM
     return max(place, round(math.log10(finest)))
 
 
