@@ -8,6 +8,7 @@ from prefect import flow
 
 from artifacts import store
 from flows.battery_change import wait_for_battery
+from flows.dead_runs import note_process
 from flows.external_flight import photos_and_logs
 from flows.given_photos import PhotoSource, given_photos, position_sigma_m
 from flows.model_structure import has_scans, model
@@ -202,7 +203,13 @@ def _simulated_wall(simulation: SimulationInput) -> Collected:
     return Collected(photos=photos, surfaces=(taken.surface,))
 
 
-@flow(name="collect-images", description=__doc__, persist_result=False, task_runner=one_a_core())
+@flow(
+    name="collect-images",
+    description=__doc__,
+    persist_result=False,
+    task_runner=one_a_core(),
+    on_running=[note_process],
+)
 def collect_images(inspection: str = "demo:bridge", out: str | None = None) -> None:
     """inspection: path of the YAML file (or demo:bridge); out: the run's folder."""
     with opened(inspection, out) as open_run:

@@ -10,6 +10,7 @@ from prefect import flow
 
 from artifacts import store
 from flows.collect_images import collect
+from flows.dead_runs import note_process
 from flows.given_photos import PhotoSource
 from flows.inspection_file import existing
 from flows.model_structure import Modelled, has_scans, model
@@ -130,7 +131,13 @@ def _mosaics(
     return [*alone, *stitch.each(calls)]
 
 
-@flow(name="detect-cracks", description=__doc__, persist_result=False, task_runner=one_a_core())
+@flow(
+    name="detect-cracks",
+    description=__doc__,
+    persist_result=False,
+    task_runner=one_a_core(),
+    on_running=[note_process],
+)
 def detect_cracks(inspection: str = "demo:wall", out: str | None = None) -> None:
     """inspection: path of the YAML file (or demo:wall); out: the run's folder."""
     with opened(inspection, out) as run:

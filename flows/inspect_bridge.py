@@ -6,6 +6,7 @@ from pathlib import Path
 from prefect import flow
 
 from flows.collect_images import Collected, collect
+from flows.dead_runs import note_process
 from flows.detect_cracks import Detected, detect_in_photos
 from flows.model_structure import Modelled, has_scans, model
 from flows.opening import OpenRun, opened
@@ -17,7 +18,13 @@ from schemas.surface import Surface
 from tasks.assessment.task import assess, write_report
 
 
-@flow(name="inspect-bridge", description=__doc__, persist_result=False, task_runner=one_a_core())
+@flow(
+    name="inspect-bridge",
+    description=__doc__,
+    persist_result=False,
+    task_runner=one_a_core(),
+    on_running=[note_process],
+)
 def inspect_bridge(
     inspection: str = "demo:bridge",
     out: str | None = None,

@@ -6,6 +6,7 @@ from pathlib import Path
 from prefect import flow
 
 from artifacts import store
+from flows.dead_runs import note_process
 from flows.inspection_file import existing
 from flows.opening import opened
 from flows.workers import one_a_core
@@ -77,7 +78,13 @@ def seen_targets(given: ScanInput) -> tuple[SeenTarget, ...]:
     return tuple(SeenTarget(name=name, position=place) for name, place in given.targets.items())
 
 
-@flow(name="model-structure", description=__doc__, persist_result=False, task_runner=one_a_core())
+@flow(
+    name="model-structure",
+    description=__doc__,
+    persist_result=False,
+    task_runner=one_a_core(),
+    on_running=[note_process],
+)
 def model_structure(inspection: str = "demo:bridge", out: str | None = None) -> None:
     """inspection: path of the YAML file (or demo:bridge); out: the run's folder."""
     with opened(inspection, out) as run:

@@ -19,6 +19,8 @@ def server() -> Iterator[None]:
     its own."""
     from prefect.settings import PREFECT_API_URL, temporary_settings
 
+    from flows.dead_runs import mark_dead_runs
+
     configured = PREFECT_API_URL.value()
     with contextlib.ExitStack() as opened:
         url = next(filter(answers, filter(None, (configured, SERVER))), None)
@@ -27,6 +29,7 @@ def server() -> Iterator[None]:
                 out.print(f"No Prefect server answers at {configured}; going on without a dashboard.")
             url = opened.enter_context(own_server())
         opened.enter_context(temporary_settings({PREFECT_API_URL: url}))
+        mark_dead_runs()
         yield
 
 

@@ -23,6 +23,7 @@ def serve_everything(port: int, report_port: int) -> int:
     host = host_reports(Path("runs"), report_port)
     server = None if answers(url) else _start_server(port, url)
     try:
+        _mark_dead_runs()
         out.print(f"Dashboard: http://127.0.0.1:{port}   Reports: http://127.0.0.1:{report_port}")
         serve_deployments()
     finally:
@@ -31,6 +32,14 @@ def serve_everything(port: int, report_port: int) -> int:
             server.terminate()
             server.wait(timeout=20)
     return 0
+
+
+def _mark_dead_runs() -> None:
+    from flows.dead_runs import mark_dead_runs
+
+    count = mark_dead_runs()
+    if count:
+        out.print(f"{count} killed run(s) marked as crashed: run them again to go on.")
 
 
 def serve_deployments() -> None:

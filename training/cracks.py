@@ -10,6 +10,8 @@ STEP_PX = 1.0  # between the points of a crack
 SUPERSAMPLED = 8  # of the truth, along each axis
 VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
 SMOOTH = 0.3  # share of cracks without roughness
+FAINT, FAINT_RMS = 0.3, (2.0, 6.0)  # share of cracks that are so many RMS of the texture darker
+GAP_PX, WIDEST_PX = 10.0, 50.0  # from where on a crack is a gap, and dark; and the widest
 # Shares of the heading's roughness at each correlation length in pixels: a crack goes around grains of every
 # size. Chords of 8, 16, 32 and 64 px turn by 21, 25, 27 and 33° RMS with branches; real ones by 19 to 26°.
 BENDS_PX = {3.0: 1.7, 10.0: 0.9, 30.0: 0.4, 100.0: 0.3}
@@ -63,22 +65,30 @@ def told(rgb: npt.NDArray[np.float32], truth: npt.NDArray[np.uint8]) -> npt.NDAr
     return np.where((crack > 0) & (dark < least), np.uint8(DOUBTFUL), truth)
 
 
-def cracks_on(rng: Rng, side_m: float, px_m: float) -> Cracks:
-    """Some cracks with their branches on a square of side_m whose photo has pixels of px_m."""
+def cracks_on(rng: Rng, side_m: float, px_m: float, rms: float) -> Cracks:
+    """Some cracks with their branches on a square of side_m whose photo has pixels of px_m; rms: of the
+    surface's ln(brightness)."""
     cracks: list[CrackShape] = []
     for _ in range(int(rng.choice([1, 2, 3, 6], p=[0.4, 0.3, 0.2, 0.1]))):
-        trunk = one_crack(rng, rng.uniform(0.05, 0.95, 2) * side_m, rng.uniform(0, 2 * np.pi), side_m, px_m)
+        start, heading = rng.uniform(0.05, 0.95, 2) * side_m, rng.uniform(0, 2 * np.pi)
+        trunk = one_crack(rng, start, heading, side_m, px_m, rms)
         cracks.append(trunk)
         for _ in range(rng.poisson(0.7)):
             at = int(rng.uniform(0.1, 0.9) * (len(trunk.uv_m) - 10))
             along = trunk.uv_m[at + 9] - trunk.uv_m[at]
             away = float(np.arctan2(along[1], along[0])) + rng.choice([-1, 1]) * rng.uniform(0.4, 1.4)
-            cracks.append(one_crack(rng, trunk.uv_m[at], away, side_m, px_m, trunk))
+            cracks.append(one_crack(rng, trunk.uv_m[at], away, side_m, px_m, rms, trunk))
     return tuple(cracks)
 
 
 def one_crack(
-    rng: Rng, start: Array, heading: float, side_m: float, px_m: float, trunk: CrackShape | None = None
+    rng: Rng,
+    start: Array,
+    heading: float,
+    side_m: float,
+    px_m: float,
+    rms: float,
+    trunk: CrackShape | None = None,
 ) -> CrackShape:
     n = int(rng.uniform(80, 700) if trunk is None else rng.uniform(40, 250))
     smooth = rng.random() < SMOOTH  # bends slowly: no roughness at the pixels' scale
@@ -91,11 +101,13 @@ def one_crack(
     n = int(inside[0]) if len(inside) else n
     n = max(n, 10)
     width_px = (
-        float(np.exp(rng.uniform(np.log(0.7), np.log(14.0))))
+        float(np.exp(rng.uniform(np.log(0.7), np.log(WIDEST_PX))))
         if rng.random() < 0.35
         else (float(rng.uniform(0.8, 4.5)))
     )
-    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.8))))
+    kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.8 if width_px < GAP_PX else 0.4))))
+    if width_px < GAP_PX and rng.random() < FAINT:
+        kept = float(np.exp(-min(rng.uniform(*FAINT_RMS) * rms, 1.5)))
     if trunk is not None:
         width_px = float(np.median(trunk.left_m + trunk.right_m)) / px_m * rng.uniform(0.35, 0.9)
         kept = float(trunk.kept_light.mean())
@@ -108,8 +120,12 @@ def one_crack(
         at, reach = rng.uniform(0, n), rng.uniform(3, 25)
         width *= 1.0 - rng.uniform(0.4, 1.0) * np.exp(-(((np.arange(n) - at) / reach) ** 2))
     rough = rng.uniform(0.0, 0.03) if smooth else rng.uniform(0.02, 0.15)
-    left, right = (np.maximum(width * (0.5 + rough * walk(rng, n, 1.5)), 0.0) for _ in range(2))
-    light = np.clip(kept + 0.06 * walk(rng, n, 40.0), 0.05, 0.85)
+    chips_px = max(1.5, 0.3 * width_px)  # whole grains break away from the edges of a gap
+    left, right = (
+        np.maximum(width * (0.5 + rough * (walk(rng, n, 1.5) + walk(rng, n, chips_px))), 0.0)
+        for _ in range(2)
+    )
+    light = np.clip(kept + min(0.06, 0.3 * (1.0 - kept)) * walk(rng, n, 40.0), 0.05, 0.95)
     return CrackShape("c", None, uv[:n], left, right, light)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from skimage.morphology import skeletonize
 
-from training.cracks import DOUBTFUL, VISIBLE, cracks_on, seen, told
+from training.cracks import DOUBTFUL, FAINT, FAINT_RMS, VISIBLE, cracks_on, seen, told
 
 SIDE_PX = 224
 ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
@@ -124,19 +124,26 @@ def _lent(rgb: Floats, truth: Floats, lender: Photo, rng: Rng) -> tuple[Floats, 
     A, _, _ = _view(lender, LENT_SCALES, 1.0, rng)
     cracks = (_warped(lender.truth, A) > 110).astype(np.float32)
     kept = (_warped(lender.kept, A).astype(np.float32) / np.float32(255.0)) ** np.exp(rng.normal(0.0, 0.3))
-    grey = np.log(rgb.mean(axis=2) + np.float32(0.02))
-    texture = float(np.std(grey - cv2.GaussianBlur(grey, (0, 0), 8.0)))
     dark = 1.0 - float((kept * cracks[..., 0]).sum() / max(1.0, float(cracks[..., 0].sum())))
-    if dark < 1.5 * texture:
+    if dark < 1.5 * _texture(rgb):
         return rgb, truth
     both = np.dstack([np.maximum(truth[..., :2], cracks[..., :2]), np.maximum(truth[..., 2], cracks[..., 0])])
     return rgb * kept[..., None].astype(np.float32), both
 
 
+def _texture(rgb: Floats) -> float:
+    """RMS of ln(brightness) at up to some ten pixels' size."""
+    grey = np.log(rgb.mean(axis=2) + np.float32(0.02))
+    return float(np.std(grey - cv2.GaussianBlur(grey, (0, 0), 8.0)))
+
+
 def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:
     """Further cracks across the crop, each lot as dark as one crack."""
-    share = seen(cracks_on(rng, SIDE_PX, 1.0), SIDE_PX, SIDE_PX, 1.0)
+    texture = _texture(rgb)
+    share = seen(cracks_on(rng, SIDE_PX, 1.0, texture), SIDE_PX, SIDE_PX, 1.0)
     kept = np.exp(rng.uniform(np.log(0.12), np.log(0.88)))
+    if rng.random() < FAINT:
+        kept = np.exp(-min(rng.uniform(*FAINT_RMS) * texture, 1.5))
     cracked = rgb * (1.0 - share * np.float32(1.0 - kept))[..., None]
     drawn = told(cracked, 255 * (share >= VISIBLE).astype(np.uint8))
     crack = (drawn == 255).astype(np.uint8)
@@ -196,7 +203,7 @@ def _relit(rgb: Floats, rng: Rng) -> Floats:
         rgb = rgb * (1.0 - shade).astype(np.float32)[..., None]
     if rng.random() < DAPPLED:
         rgb = _dappled(rgb, rng)
-    gain = np.exp(rng.normal(0.0, 0.3) + rng.normal(0.0, 0.06, 3)).astype(np.float32)
+    gain = np.exp(rng.normal(-0.1, 0.45) + rng.normal(0.0, 0.06, 3)).astype(np.float32)
     rgb = np.clip(rgb * gain, np.float32(1e-3), np.float32(1.0)) ** np.float32(np.exp(rng.normal(0.0, 0.25)))
     grey = rgb @ np.full((3, 1), 1 / 3, np.float32)
     if rng.random() < 0.5:

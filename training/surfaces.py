@@ -29,6 +29,14 @@ FOCAL_PX = 4000.0
 RAGGED = 0.4  # share of joints that are no clean lines
 CRACK_FREE = 0.35  # share of surfaces without any crack
 TEXEL_PX = 2.0
+# Of each kind, its share of the surfaces and the RMS of ln(brightness).
+KINDS = {
+    "cast": (0.45, 0.06),
+    "rough": (0.2, 0.12),
+    "smooth": (0.15, 0.025),
+    "wood": (0.1, 0.03),
+    "brick": (0.1, 0.07),
+}
 
 Array = npt.NDArray[np.float64]
 Rng = np.random.Generator
@@ -41,9 +49,11 @@ def surface(seed: int, crack_free: bool = False) -> tuple[npt.NDArray[np.uint8],
     px_m = float(np.exp(rng.uniform(np.log(0.0003), np.log(0.0015))))
     side_m = 1.04 * SIDE_PX * px_m
     face = Face("board", (-side_m / 2, 0.0, -side_m / 2), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), side_m, side_m)
-    cracks = () if rng.random() < (1.0 if crack_free else CRACK_FREE) else cracks_on(rng, side_m, px_m)
+    kind = str(rng.choice(list(KINDS), p=[share for share, _ in KINDS.values()]))
+    rms = KINDS[kind][1] * float(np.exp(rng.normal(0, 0.25)))
+    cracks = () if rng.random() < (1.0 if crack_free else CRACK_FREE) else cracks_on(rng, side_m, px_m, rms)
     wires = _wires(rng, side_m, px_m)
-    skin = _skin(rng, seed, face, px_m, cracks, wires)
+    skin = _skin(rng, seed, kind, rms, face, px_m, cracks, wires)
     camera = Camera(width_px=SIDE_PX, height_px=SIDE_PX, focal_px=FOCAL_PX)
     pose = CameraPose(position_m=(0.0, -FOCAL_PX * px_m, 0.0), yaw_deg=0.0, pitch_deg=0.0)
     speed_m_s = rng.normal(0.0, 0.5, 3) * px_m / camera.shutter_s
@@ -65,10 +75,9 @@ def _compressed(rgb: npt.NDArray[np.uint8], quality: int) -> npt.NDArray[np.uint
 # Surfaces
 
 
-def _skin(rng: Rng, seed: int, face: Face, px_m: float, cracks: Cracks, wires: Cracks) -> Skin:
-    kind = rng.choice(["cast", "rough", "smooth", "wood", "brick"], p=[0.45, 0.2, 0.15, 0.1, 0.1])
-    rms = {"cast": 0.06, "rough": 0.12, "smooth": 0.025, "wood": 0.03, "brick": 0.07}[kind]
-    rms *= float(np.exp(rng.normal(0, 0.25)))
+def _skin(
+    rng: Rng, seed: int, kind: str, rms: float, face: Face, px_m: float, cracks: Cracks, wires: Cracks
+) -> Skin:
     grey = float(np.exp(rng.uniform(np.log(0.12), np.log(0.65))))
     tint = np.exp(rng.normal(0, 0.06, 3)) * np.array([1.05, 1.0, 0.93]) ** rng.uniform(-0.5, 2.5)
     side_m, texel_m = face.width_m, TEXEL_PX * px_m
@@ -233,7 +242,7 @@ def _things(rng: Rng, side_m: float, px_m: float) -> list[Shapes]:
     """What lies on top: chalk, markers, scratches."""
     shapes: list[Shapes] = []
     for _ in range(rng.poisson(0.5)):  # chalk and scratches: bright, and wandering like a crack
-        mark = one_crack(rng, rng.uniform(0, side_m, 2), rng.uniform(0, 2 * np.pi), side_m, px_m)
+        mark = one_crack(rng, rng.uniform(0, side_m, 2), rng.uniform(0, 2 * np.pi), side_m, px_m, 0.0)
         if len(mark.uv_m) > 1:
             bright = np.full(len(mark.uv_m), rng.uniform(1.15, 2.0))
             shapes.append(segments(mark.uv_m, mark.left_m, mark.right_m, bright))

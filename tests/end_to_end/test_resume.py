@@ -1,7 +1,9 @@
 """Kill the process in any stage and run the same command again: same cracks, byte for byte."""
 
+import contextlib
 import os
 import signal
+import sqlite3
 import subprocess
 import time
 from collections.abc import Callable
@@ -27,6 +29,15 @@ def test_after_a_kill_the_run_goes_on_to_the_same_cracks(tmp_path: Path) -> None
     finished = hairline(*RUN, cwd=tmp_path / "killed").stdout
     assert "ingest ×2: 2 cached" in finished
     assert _cracks(tmp_path / "killed") == _cracks(tmp_path / "undisturbed")
+    if not answers(SERVER):  # else the runs are in the database of somebody's `hairline serve`
+        assert _states(tmp_path / "killed", "flow_run") == {"CRASHED": 2, "COMPLETED": 1}
+        assert "RUNNING" not in _states(tmp_path / "killed", "task_run")
+
+
+def _states(home: Path, table: str) -> dict[str, int]:
+    """How many rows of each state Prefect's database has."""
+    with contextlib.closing(sqlite3.connect(home / ".prefect" / "prefect.db")) as database:
+        return dict(database.execute(f"select state_type, count(*) from {table} group by state_type"))
 
 
 def _cracks(folder: Path) -> bytes:

@@ -71,7 +71,7 @@ def test_cracks_turn_as_real_ones_do(chord_px: int) -> None:
     turns: list[float] = []
     for seed in range(200):
         rng = np.random.default_rng(seed)
-        uv = one_crack(rng, np.full(2, 500.0), rng.uniform(0, 2 * np.pi), 1000.0, 1.0).uv_m
+        uv = one_crack(rng, np.full(2, 500.0), rng.uniform(0, 2 * np.pi), 1000.0, 1.0, 0.0).uv_m
         steps = np.diff(uv[::chord_px], axis=0)
         turns += np.degrees(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))).tolist()
     assert 13.0 < np.sqrt(np.mean(np.square(turns))) < 28.0

@@ -1,0 +1,63 @@
+"""Runs whose process was killed: Prefect hears nothing of that and would show them as running for ever."""
+
+import os
+import socket
+from typing import Any
+from uuid import UUID
+
+from prefect import Flow
+from prefect.client.orchestration import SyncPrefectClient, get_client
+from prefect.client.schemas.filters import (
+    FlowRunFilter,
+    FlowRunFilterId,
+    FlowRunFilterState,
+    FlowRunFilterStateType,
+    TaskRunFilter,
+    TaskRunFilterState,
+    TaskRunFilterStateType,
+)
+from prefect.client.schemas.objects import FlowRun, State, StateType
+from prefect.states import Crashed
+
+KILLED = "Its process was killed. Run it again to go on: finished stages are kept."
+
+
+def note_process(flow: Flow[..., Any], flow_run: FlowRun, state: State[Any]) -> None:
+    """Hook of a flow that starts to run: the run says on which machine and by which process."""
+    with get_client(sync_client=True) as client:
+        client.update_flow_run(flow_run.id, infrastructure_pid=f"{socket.gethostname()}:{os.getpid()}")
+
+
+def mark_dead_runs() -> int:
+    """As crashed, with the tasks they were in, every run of this machine whose process is gone; how many."""
+    running = FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=[StateType.RUNNING])))
+    with get_client(sync_client=True) as client:
+        dead = [run for run in client.read_flow_runs(flow_run_filter=running) if _is_dead(run)]
+        for run in dead:
+            _mark(client, run.id)
+    return len(dead)
+
+
+def _is_dead(run: FlowRun) -> bool:
+    host, _, pid = (run.infrastructure_pid or "").rpartition(":")
+    if host != socket.gethostname() or not pid.isdigit():
+        return False
+    try:
+        os.kill(int(pid), 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:  # somebody else's
+        pass
+    return False
+
+
+def _mark(client: SyncPrefectClient, flow_run_id: UUID) -> None:
+    tasks = client.read_task_runs(
+        flow_run_filter=FlowRunFilter(id=FlowRunFilterId(any_=[flow_run_id])),
+        task_run_filter=TaskRunFilter(
+            state=TaskRunFilterState(type=TaskRunFilterStateType(any_=[StateType.RUNNING]))
+        ),
+    )
+    for task in tasks:
+        client.set_task_run_state(task.id, Crashed(message=KILLED), force=True)
+    client.set_flow_run_state(flow_run_id, Crashed(message=KILLED), force=True)
