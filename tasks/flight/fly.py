@@ -43,11 +43,12 @@ AIRBORNE_M = 0.5
 
 
 class FlightLost(Exception):
-    """The flight is no longer followed: the link broke, or Ctrl-C. recording: what was received so far."""
+    """The flight is no longer followed: the link broke, or Ctrl-C. recording: what was received so far; left:
+    what of its settings stays changed on the vehicle, in words."""
 
-    def __init__(self, recording: Recording, interrupted: bool = False) -> None:
-        super().__init__(recording, interrupted)
-        self.recording, self.interrupted = recording, interrupted
+    def __init__(self, recording: Recording, left: str | None, interrupted: bool = False) -> None:
+        super().__init__(recording, left, interrupted)
+        self.recording, self.left, self.interrupted = recording, left, interrupted
 
 
 class Flight:
@@ -155,16 +156,16 @@ class Flight:
             self._check_armed()
             self._start()
         except LinkLost:
-            raise FlightLost(self.reader.close()) from None
+            raise self._lost() from None
         except BaseException:
             self._stand_down()
             raise
         try:
             self._follow(on_progress)
         except LinkLost:
-            raise FlightLost(self.reader.close()) from None
+            raise self._lost() from None
         except KeyboardInterrupt:
-            raise FlightLost(self.reader.close(), interrupted=True) from None
+            raise self._lost(interrupted=True) from None
         landed = not self.reader.armed and bool(self.reader.recording.armed_s)
         recording = self.reader.close()
         self._recorder = None
@@ -243,6 +244,10 @@ class Flight:
         except LinkLost:
             return
         abandon_mission(self.link)
+
+    def _lost(self, interrupted: bool = False) -> FlightLost:
+        left = self._way_home.left if self._way_home else None
+        return FlightLost(self.reader.close(), left, interrupted)
 
     def _give_back(self) -> None:
         if self._way_home is not None:

@@ -188,4 +188,6 @@ def _cut_short(connection: str, timeout_s: float, lost: "FlightLost", archive: F
     else:
         what = f"the vehicle was not heard for {timeout_s:g} s, {flown_s:.0f} s after arming"
         then = "It follows its own failsafe"
+    if lost.left is not None:
+        then = f"{then}. {lost.left}"
     return FlightCutShort(connection, what, then, archive, store.current().path(archive))

@@ -46,6 +46,14 @@ class WayHome:
             self.told.append(f"{name} could not be set back to {value:g}: the vehicle keeps the plan's")
         self._own = None
 
+    @property
+    def left(self) -> str | None:
+        """What is to be set again by hand where the flight is no longer followed."""
+        if self._own is None:
+            return None
+        name, value = self._own.param_id, self._own.param_value
+        return f"Its {name} is this flight's: set it back to {value:g} once it has landed"
+
     def _set_height(self, height_m: float) -> None:
         found = read_parameters(self.link, [HEIGHT, *PRESUMED])
         own = next((found[name] for name in HEIGHT if name in found), None)

@@ -158,9 +158,13 @@ def test_an_interrupted_flight_keeps_what_was_archived_and_says_that_the_vehicle
             raise KeyboardInterrupt
 
     monkeypatch.setattr("tasks.flight.fly.archive", interrupted)
-    flies_on = r"interrupted, \d+ s after arming\. The vehicle flies its mission on.*take over"
-    with start_vehicle(PLAN, 3) as url, pytest.raises(FlightCutShort, match=flies_on) as problem:
-        fly.bare(PLAN, "1", url, 5.0)
+    flies_on = (
+        r"interrupted, \d+ s after arming\. The vehicle flies its mission on.*take over.*"
+        r"Its RTL_ALT is this flight's: set it back to 1500 once it has landed"
+    )
+    plan = PLAN.model_copy(update={"return_height_m": 8.5})
+    with start_vehicle(plan, 3) as url, pytest.raises(FlightCutShort, match=flies_on) as problem:
+        fly.bare(plan, "1", url, 5.0)
     part = import_log.bare(problem.value.archive, "flight.mcap", PLAN)
     assert part.shots
     assert part.missed
