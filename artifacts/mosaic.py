@@ -1,7 +1,6 @@
 """Mosaics on disk: image, coverage and source as tiled, pyramidal TIFF (deflate), written as tiles come."""
 
 import json
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import cv2
+import imagecodecs
 import numpy as np
 import numpy.typing as npt
 import tifffile
@@ -17,7 +17,7 @@ from artifacts.geotiff import NODATA, SCALE
 
 TILE_PX = 256
 CLASSIC_LIMIT = 3_500_000_000  # raw bytes from which on the file is a BigTIFF
-LEVEL = 1  # of deflate: photos hardly compress, so quickly
+LEVEL = 1  # of deflate, by libdeflate: photos hardly compress, so quickly
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class TiledTiff:
         full = np.zeros((TILE_PX, TILE_PX, *self._channels), self._dtype)
         full[: tile.shape[0], : tile.shape[1]] = tile
         if full.any():
-            data = zlib.compress(full.tobytes(), LEVEL)
+            data = _packed(full)
             self._where[place] = (self._stream.seek(0, 2), len(data))
             self._stream.write(data)
         if place[0] + 1 < len(self._levels):
@@ -124,9 +124,7 @@ class TiledTiff:
         while self._growing:  # what never came is blank
             place = min(self._growing)
             self._keep(place, self._growing.pop(place)[0])
-        blank = zlib.compress(
-            bytes(TILE_PX * TILE_PX * max(self._channels, default=1) * self._dtype.itemsize), LEVEL
-        )
+        blank = _packed(np.zeros((TILE_PX, TILE_PX, *self._channels), self._dtype))
 
         def tiles(level: int) -> Iterator[bytes]:
             height, width = self._levels[level]
@@ -174,6 +172,10 @@ class TiledTiff:
             self.close()
         else:
             self._discard()
+
+
+def _packed(tile: npt.NDArray[Any]) -> bytes:
+    return bytes(imagecodecs.deflate_encode(tile.tobytes(), LEVEL))
 
 
 class MosaicWriter:

@@ -44,6 +44,7 @@ def exposure(pixels: Pixels) -> float:
 
 def clipped(pixels: Pixels) -> tuple[float, float]:
     """Shares of pixels that are white and that are black in every channel."""
-    red, green, blue = cv2.split(pixels)
-    least, most = cv2.min(cv2.min(red, green), blue), cv2.max(cv2.max(red, green), blue)
-    return float(np.mean(least >= WHITE)), float(np.mean(most <= BLACK))
+    count = pixels.shape[0] * pixels.shape[1]
+    white = cv2.inRange(pixels, np.full(3, WHITE, np.uint8), np.full(3, 255, np.uint8))
+    black = cv2.inRange(pixels, np.zeros(3, np.uint8), np.full(3, BLACK, np.uint8))
+    return cv2.countNonZero(white) / count, cv2.countNonZero(black) / count

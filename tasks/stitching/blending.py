@@ -31,11 +31,10 @@ class MultiBand:
     def result(self) -> npt.NDArray[np.uint8]:
         """(H, W, 3), 0 where no layer reaches. To be asked once."""
         image = np.zeros_like(self._sum[BANDS])
-        for k in range(BANDS, -1, -1):
-            coarse = image if k == BANDS else np.asarray(cv2.pyrUp(image), np.float32)
-            image = self._sum[k]
-            _collapse(image, self._weight[k], coarse)
-        return np.asarray(cv2.convertScaleAbs(np.maximum(image, np.float32(0.0))), np.uint8)
+        for k in range(BANDS, 0, -1):
+            _collapse(self._sum[k], self._weight[k], image)
+            image = np.asarray(cv2.pyrUp(self._sum[k]), np.float32)
+        return np.asarray(_levels(self._sum[0], self._weight[0], image), np.uint8)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -58,3 +57,16 @@ def _collapse(total: Layer, weight: Layer, coarse: Layer) -> None:
             share = np.float32(1.0) / max(weight[y, x], np.float32(1e-4))
             for c in range(3):
                 total[y, x, c] = total[y, x, c] * share + coarse[y, x, c]
+
+
+@numba.njit(cache=True, nogil=True)
+def _levels(total: Layer, weight: Layer, coarse: Layer) -> npt.NDArray[np.uint8]:
+    """The same of the finest band, rounded to grey levels."""
+    levels = np.empty(total.shape, np.uint8)
+    for y in range(weight.shape[0]):
+        for x in range(weight.shape[1]):
+            share = np.float32(1.0) / max(weight[y, x], np.float32(1e-4))
+            for c in range(3):
+                level = np.rint(total[y, x, c] * share + coarse[y, x, c])
+                levels[y, x, c] = np.uint8(min(max(level, np.float32(0.0)), np.float32(255.0)))
+    return levels

@@ -2,19 +2,20 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from os import cpu_count
 from threading import Lock
 
 import cv2
+import numba
 import numpy as np
 import numpy.typing as npt
 
 from tasks.stitching.blending import ALIGN, REACH, MultiBand
 from tasks.stitching.canvas import Canvas
 from tasks.stitching.gain import Light, gain_table, relit
-from tasks.stitching.seams import Partition, label_window, partition, photo_map
+from tasks.stitching.seams import NONE, Labels, Partition, label_window, partition, photo_map
 from tasks.stitching.view import View, shrunk
 
 Pixels = npt.NDArray[np.uint8]
@@ -33,22 +34,31 @@ class Tile:
 
 
 class PhotoCache:
-    """Photos as RGB; the least lately used go first. Safe to share between threads."""
+    """Photos as RGB; the least lately used go first. Threads may share it: one reads, the others wait."""
 
     def __init__(self, read: Callable[[int], Pixels]) -> None:
-        self._read, self._kept, self._lock = read, OrderedDict[int, Pixels](), Lock()
+        self._read, self._kept, self._lock = read, OrderedDict[int, Future[Pixels]](), Lock()
 
     def __call__(self, index: int) -> Pixels:
         with self._lock:
-            if index in self._kept:
-                self._kept.move_to_end(index)
-                return self._kept[index]
-        pixels = self._read(index)
+            found = self._kept.get(index)
+            mine = self._kept.setdefault(index, Future()) if found is None else found
+            self._kept.move_to_end(index)
+        if found is None:
+            try:
+                mine.set_result(self._read(index))
+            except BaseException as problem:
+                mine.set_exception(problem)
+                raise
+            self._forget()
+        return mine.result()
+
+    def _forget(self) -> None:
         with self._lock:
-            self._kept[index] = pixels
-            while len(self._kept) > 1 and sum(p.nbytes for p in self._kept.values()) > CACHE_BYTES:
-                self._kept.popitem(last=False)
-        return pixels
+            there = {i: one.result().nbytes for i, one in self._kept.items() if one.done()}
+            while len(there) > 1 and sum(there.values()) > CACHE_BYTES:
+                oldest = next(iter(there))
+                del there[oldest], self._kept[oldest]
 
 
 def composite(
@@ -110,24 +120,48 @@ def _tile(
     ww, wh = TILE_PX + 2 * REACH, TILE_PX + 2 * REACH
     label = label_window(views, worth, canvas, parted, wx, wy, ww, wh)
     blend = MultiBand(ww, wh)
-    for i in map(int, np.flatnonzero(np.bincount(label.ravel() + 1)[1:])):  # photos in sight
-        mine = label == i
-        x0, x1 = _extent(mine.any(axis=0), ww)
-        y0, y1 = _extent(mine.any(axis=1), wh)
+    for i, (left, right, top, bottom) in _boxes(label):
+        x0, x1 = _reached(left, right, ww)
+        y0, y1 = _reached(top, bottom, wh)
         at = photo_map(views[i], canvas, wx + x0, wy + y0, x1 - x0, y1 - y0)
         warped = cv2.remap(read(i), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         layer = relit(np.asarray(warped, np.uint8), at, views[i], tables[i], light.falloff[i])
-        blend.add(layer, mine[y0:y1, x0:x1].astype(np.float32), x0, y0)
+        blend.add(layer, (label[y0:y1, x0:x1] == i).astype(np.float32), x0, y0)
     inner = (slice(REACH, REACH + height), slice(REACH, REACH + width))
     own = label[inner]
     covered = own >= 0
-    rgb = np.where(covered[..., None], blend.result()[inner], 0).astype(np.uint8)
+    rgb = np.ascontiguousarray(blend.result()[inner])
+    if not covered.all():
+        rgb[~covered] = 0
     return Tile(x, y, rgb, np.where(covered, 255, 0).astype(np.uint8), (own + 1).astype(np.uint16))
 
 
-def _extent(used: npt.NDArray[np.bool_], size: int) -> tuple[int, int]:
-    """Where it is used, grown by the reach of blending, aligned."""
-    where = np.flatnonzero(used)
-    low = max(0, (int(where[0]) - REACH) // ALIGN * ALIGN)
-    high = min(size, -(-(int(where[-1]) + 1 + REACH) // ALIGN) * ALIGN)
-    return low, high
+def _boxes(label: Labels) -> Iterator[tuple[int, tuple[int, int, int, int]]]:
+    """Every photo in sight, and the left, right, top and bottom of its land; right and bottom excluded."""
+    lowest, highest = int(label.min()), int(label.max())
+    if highest == NONE:
+        return
+    boxes = _extents(label, highest + 1)
+    for i in range(max(lowest, 0), highest + 1):
+        left, right, top, bottom = map(int, boxes[i])
+        if right > 0:
+            yield i, (left, right, top, bottom)
+
+
+@numba.njit(cache=True, nogil=True)
+def _extents(label: Labels, photos: int) -> Labels:
+    """(photos, 4); right is 0 where a photo has no land."""
+    boxes = np.empty((photos, 4), np.int32)
+    boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3] = label.shape[1], 0, label.shape[0], 0
+    for y in range(label.shape[0]):
+        for x in range(label.shape[1]):
+            if label[y, x] >= 0:
+                box = boxes[label[y, x]]
+                box[0], box[1] = min(box[0], x), max(box[1], x + 1)
+                box[2], box[3] = min(box[2], y), max(box[3], y + 1)
+    return boxes
+
+
+def _reached(low: int, high: int, size: int) -> tuple[int, int]:
+    """Grown by the reach of blending, aligned."""
+    return max(0, (low - REACH) // ALIGN * ALIGN), min(size, -(-(high + REACH) // ALIGN) * ALIGN)

@@ -32,6 +32,7 @@ SOFT = 0.01  # log ratios that differ by more count by their absolute value
 ROUNDS = 10
 LEAST_SAMPLES = 20
 TERMS = 2  # of the falloff: squared and fourth power of the distance from the middle
+FALLOFF_STEPS = 4096  # from the axis to the rim: a step is 0.01 grey levels at most
 RIM = 1.3  # farther out than this, in squared half diagonals, no photo reaches
 
 
@@ -62,23 +63,24 @@ def relit(pixels: Pixels, at: Floats, view: View, table: Floats, falloff: Array)
 
     A factor on linear light is one on the sRGB level + 14.025, but for the darkest ten levels."""
     w, h = view.camera.width_px, view.camera.height_px
-    cx, cy = view.camera.principal_px
-    lens = np.array([cx, cy, 4.0 / (w * w + h * h), falloff[0] / 2.4, falloff[1] / 2.4], np.float32)
-    return np.asarray(_relit(pixels, at, table, lens), np.float32)
+    rho2 = np.linspace(0.0, RIM, FALLOFF_STEPS + 1)
+    factor = np.exp(rho2 * (falloff[0] + rho2 * falloff[1]) / 2.4).astype(np.float32)
+    lens = np.array([*view.camera.principal_px, FALLOFF_STEPS / RIM * 4.0 / (w * w + h * h)], np.float32)
+    return np.asarray(_relit(pixels, at, table, lens, factor), np.float32)
 
 
 @numba.njit(cache=True, nogil=True)
-def _relit(pixels: Pixels, at: Floats, table: Floats, lens: Floats) -> Floats:
-    """lens: the axis's pixel, 1 / half diagonal², and the terms of the log of the factor."""
+def _relit(pixels: Pixels, at: Floats, table: Floats, lens: Floats, factor: Floats) -> Floats:
+    """lens: the axis's pixel, and steps of `factor` per squared pixel from it."""
     levels = np.empty(pixels.shape, np.float32)
-    lift, rim = np.float32(14.025), np.float32(RIM)
+    lift, last = np.float32(14.025), np.float32(len(factor) - 1)
     for y in range(pixels.shape[0]):
         for x in range(pixels.shape[1]):
             dx, dy = at[y, x, 0] - lens[0], at[y, x, 1] - lens[1]
-            rho2 = min((dx * dx + dy * dy) * lens[2], rim)
-            factor = np.exp(rho2 * (lens[3] + rho2 * lens[4]))
+            step = min((dx * dx + dy * dy) * lens[2], last)
+            brighter = factor[int(step + np.float32(0.5))]
             for c in range(3):
-                levels[y, x, c] = (table[pixels[y, x, c], c] + lift) * factor - lift
+                levels[y, x, c] = (table[pixels[y, x, c], c] + lift) * brighter - lift
     return levels
 
 

@@ -182,10 +182,11 @@ def label_window(
     where no photo shows a whole cell, along the mosaic's rim, pixel by pixel."""
     label = parted.window(x0, y0, width, height)
     rim = label == NONE
+    rx0, ry0, rx1, ry1 = _around(rim, canvas, x0, y0)
     best = np.zeros((height, width), np.float32)
-    for i, view in enumerate(views):
+    for i, view in enumerate(views if rx0 < rx1 else ()):
         bx0, by0, bx1, by1 = canvas.bounds_px(view)
-        ax0, ay0, ax1, ay1 = max(bx0, x0), max(by0, y0), min(bx1, x0 + width), min(by1, y0 + height)
+        ax0, ay0, ax1, ay1 = max(bx0, rx0), max(by0, ry0), min(bx1, rx1), min(by1, ry1)
         window = (slice(ay0 - y0, ay1 - y0), slice(ax0 - x0, ax1 - x0))
         if ax0 >= ax1 or ay0 >= ay1 or not rim[window].any():
             continue
@@ -195,3 +196,15 @@ def label_window(
         best[window][better] = depth[better]
         label[window][better] = i
     return label
+
+
+def _around(rim: npt.NDArray[np.bool_], canvas: Canvas, x0: int, y0: int) -> tuple[int, int, int, int]:
+    """The box of the rim's pixels on the canvas, the window's corner at x0, y0: left, top, right, bottom;
+    empty where there are none."""
+    top, left = max(0, -y0), max(0, -x0)
+    on_canvas = rim[top : canvas.height_px - y0, left : canvas.width_px - x0]
+    rows, columns = np.flatnonzero(on_canvas.any(axis=1)), np.flatnonzero(on_canvas.any(axis=0))
+    if len(rows) == 0:
+        return 0, 0, 0, 0
+    right, bottom = left + int(columns[-1]) + 1, top + int(rows[-1]) + 1
+    return x0 + left + int(columns[0]), y0 + top + int(rows[0]), x0 + right, y0 + bottom
