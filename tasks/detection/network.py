@@ -18,9 +18,9 @@ from numba import njit
 
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
-from tasks.detection.heap import given_back, reused
 from tasks.detection.sauvola import Mask
 from tasks.detection.windows import Pieces, Window, grid, whole_of
+from tasks.heap import given_back, reused
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")

@@ -21,6 +21,7 @@ from schemas.flight_plan import FlightPlan
 from schemas.photo import Features, Photo
 from schemas.problem import BadInput
 from schemas.settings import StitchSettings
+from tasks.heap import reused
 from tasks.stage import stage
 
 Charuco = tuple[tuple[int, int], str, float]  # squares across and down, dictionary, marker over square
@@ -42,7 +43,10 @@ def ingest(
     from tasks.photos.quality import clipped, exposure, sharpness
     from tasks.photos.reading import read_photo
 
-    decoded = read_photo(store.current().path(file), name)
+    with reused():
+        decoded = read_photo(store.current().path(file), name)
+        white, black = clipped(decoded.pixels)
+        sharp, along = sharpness(decoded.pixels)
     height_px, width_px = decoded.pixels.shape[:2]
     metadata = read_metadata(decoded.exif, decoded.xmp)
     if camera is None:
@@ -50,8 +54,6 @@ def ingest(
     else:
         camera = camera_of_photo(camera, width_px, height_px, decoded.orientation, name)
         camera_from, focal_sigma = "inspection", 0.01
-    white, black = clipped(decoded.pixels)
-    sharp, along = sharpness(decoded.pixels)
     if not decoded.as_it_came:
         with store.current().scratch() as folder:
             Image.fromarray(decoded.pixels).save(folder / "upright.png", compress_level=3)
@@ -119,10 +121,11 @@ def features(photo: Photo, settings: StitchSettings) -> Features:
     from tasks.photos.sift import detect_features, write_features
 
     path = store.current().path(photo.file)
-    grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-    if grey is None:
-        raise BadInput(photo.name, "cannot be read", REMEDY)
-    keypoints = detect_features(np.asarray(grey, np.uint8), photo.camera, settings.features)
+    with reused():
+        grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+        if grey is None:
+            raise BadInput(photo.name, "cannot be read", REMEDY)
+        keypoints = detect_features(np.asarray(grey, np.uint8), photo.camera, settings.features)
     with store.current().scratch() as folder:
         write_features(keypoints, folder / "features.npz")
         entered = store.current().put(folder / "features.npz")

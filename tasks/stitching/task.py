@@ -24,6 +24,7 @@ from schemas.problem import BadInput, LeftOut
 from schemas.relief import Relief
 from schemas.settings import StitchSettings
 from schemas.surface import Surface
+from tasks.heap import given_back
 from tasks.stage import progress, stage
 
 if TYPE_CHECKING:
@@ -91,6 +92,7 @@ def stitch(
 
     if not photos:
         raise BadInput(name, "has no photo", "Give it photos, or leave it out")
+    given_back()  # what reading the photos left
     described = sorted(zip(photos, features, strict=True), key=lambda pair: pair[0].name)
     ordered = [photo for photo, _ in described]
     found = [_features(of_photo) for _, of_photo in described]

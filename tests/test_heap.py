@@ -9,7 +9,7 @@ import pytest
 PROGRAM = """
 import resource
 import numpy as np
-from tasks.detection.heap import reused
+from tasks.heap import reused
 
 def first_touches():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
