@@ -81,7 +81,7 @@ def detect_raster(
 def _by_network(
     raster: Raster, model: Model, min_score: float, least_px: float, on_progress: Progress | None
 ) -> DetectionArrays:
-    """What a network holds for cracks, long and likely enough as a whole, less what is straight."""
+    """What a network holds for cracks, long and likely enough as a whole, less what is soft or straight."""
     parts = (
         at_least(model.limits.edge, p, window.top, window.left)
         for window, p in probabilities(raster, model, on_progress)
@@ -90,12 +90,14 @@ def _by_network(
     given = candidates(pixels, model.limits)
     long = (given.found.extent_px >= least_px) & given.found.thin
     likely = given.score >= min_score
-    left, joints = without_joints(given.found.keep(long & likely), JOINT_LENGTHS * least_px, least_px)
+    sharp, stains = without_soft(given.found.keep(long & likely), raster, pixels.mask)
+    left, joints = without_joints(sharp, JOINT_LENGTHS * least_px, least_px)
     mask = long_and_thin(left, 1, least_px).mask
     return DetectionArrays(
         mask,
         count_valid(raster),
         tuple(joints),
+        tuple(stains),
         scores=given.at(given.found.holding(mask.at(pixels.y, pixels.x))),
         doubtful=given.at(long & ~likely & (given.score >= WORTH_SAYING)),
     )
