@@ -18,6 +18,11 @@ LEAST_M = 0.3  # flat ground seen at a grazing angle is not
 OF_ONE_VIEW = 1e-12  # views are computed alike; normals, which stand for views not known, are never so near
 MOST_HIDDEN = 0.05  # of a station's own points: edges and leaves make up to 2 %, false places 9 % and more
 WIDEST_GAP_DEG = 15  # without any echo: water, glass or a road to the horizon; wider, nobody looked
+STOPS_DEG = (5.0, 85.0)  # highest echoes alike below are the horizon's, above the zenith's
+STRAY = 0.02  # share of the circle where an echo from above a head's stop is a bird's
+ALIKE_DEG = 0.5  # that the highest echoes of a head that turns no further differ by
+MANY = 90  # degrees of the circle: no roof's edge is so high all along
+SOME, UNEVEN = 12, 1.5  # so many, where things this many times as far as others end there alike
 
 
 def scanners(cloud: Cloud, scanners_m: Floats) -> tuple[Floats, tuple[ScanWindow, ...]]:
@@ -39,7 +44,7 @@ def scanners(cloud: Cloud, scanners_m: Floats) -> tuple[Floats, tuple[ScanWindow
 def window(rays_m: Floats) -> ScanWindow:
     """Where a scanner with (N, 3) echoes looked: not where a wide sector has no echo at all, be it low or
     high, nor lower than its lowest echo. One that saw less than half the circle was aimed, and looked no
-    higher than its highest echo; any other saw the sky."""
+    higher than its highest echo, nor did one whose head turns no further; any other saw the sky."""
     east, north, up = rays_m.T
     seen = np.unique(np.floor(np.degrees(np.arctan2(north, east)) % 360.0).astype(np.int64) % 360)
     gaps = np.diff(seen, append=seen[0] + 360) - 1
@@ -48,8 +53,23 @@ def window(rays_m: Floats) -> ScanWindow:
         (float(a + 1) % 360, float(a + 1 + gap) % 360) for a, gap in zip(seen[wide], gaps[wide], strict=True)
     )
     elevation = np.degrees(np.arctan2(up, np.hypot(east, north)))
-    highest = float(elevation.max()) if gaps[wide].sum() > 180 else 90.0
+    aimed = gaps[wide].sum() > 180
+    highest = float(elevation.max()) if aimed else _stop(rays_m, elevation)
     return ScanWindow(blind_deg=blind, lowest_deg=float(elevation.min()), highest_deg=highest)
+
+
+def _stop(rays_m: Floats, elevation: Floats) -> float:
+    """Where the scanner's head turns no further up: there its highest echoes end alike, whatever they are of;
+    90 where they do not."""
+    azimuth = np.floor(np.degrees(np.arctan2(rays_m[:, 1], rays_m[:, 0])) % 360.0).astype(np.int64) % 360
+    by_azimuth = np.lexsort((elevation, azimuth))
+    last = np.flatnonzero(np.diff(azimuth[by_azimuth], append=360))
+    top = by_azimuth[last]  # the highest echo of each degree
+    stop = float(np.quantile(elevation[top], 1.0 - STRAY))
+    there = top[np.abs(elevation[top] - stop) < ALIKE_DEG]
+    near, far = np.quantile(np.linalg.norm(rays_m[there], axis=1), (0.1, 0.9))
+    alike = len(there) >= MANY or (len(there) >= SOME and far > UNEVEN * near)
+    return stop if alike and STOPS_DEG[0] < stop < STOPS_DEG[1] else 90.0
 
 
 def hidden_share(rays_m: Floats) -> float:
