@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from schemas.camera import Camera
+from tasks.stitching.derivatives import differentiate
 from tasks.stitching.prior import Prior
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.tracks import Index, Observations
@@ -179,32 +180,39 @@ def residuals(state: State, bundle: Bundle) -> Array:
 
 
 def _as_taken(off: Array, state: State, bundle: Bundle) -> Array:
-    """(M, 2) or (M, 2, K) in pixels of the photo as taken, of what the row that was seen, rather than the row
-    foretold, makes of the rolling shutter: left so, noise in the rows would shrink as the shutter's stretch
-    grows, and stretch every photo."""
-    slope = _roll_per_row(state, bundle).reshape(len(off), 2, *(1,) * (off.ndim - 2))
+    """(M, 2) in pixels of the photo as taken, of what the row that was seen, rather than the row foretold,
+    makes of the rolling shutter: left so, noise in the rows would shrink as the shutter's stretch grows, and
+    stretch every photo."""
+    slope = (state.roll / _heights_px(bundle)[:, None])[bundle.photo]
     y = off[:, 1] / (1.0 - slope[:, 1])
-    return np.stack([off[:, 0] + slope[:, 0] * y, y], axis=1)
+    return np.column_stack([off[:, 0] + slope[:, 0] * y, y])
 
 
-def _roll_per_row(state: State, bundle: Bundle) -> Array:
-    height = np.array([c.height_px for c in bundle.cameras])[bundle.camera_of]
-    return np.asarray((state.roll / height[:, None])[bundle.photo])
+def _heights_px(bundle: Bundle) -> Array:
+    """(n,) of the photos."""
+    return np.array([float(c.height_px) for c in bundle.cameras])[bundle.camera_of]
 
 
 @dataclass(frozen=True)
 class Jacobians:
-    pose: Array  # (M, 2, 8) by rotation (in the camera's frame, radians), position and rolling shutter
-    lens: Array  # (M, 2, 4) by the numbers of State.lens
+    camera: Array  # (M, 2, 12) by what the observation's photo and its lens have
     point: Array  # (M, 2, 2)
+
+    @property
+    def pose(self) -> Array:
+        """(M, 2, 8) by rotation (in the camera's frame, radians), position and rolling shutter."""
+        return self.camera[:, :, :PER_PHOTO]
+
+    @property
+    def lens(self) -> Array:
+        """(M, 2, 4) by the numbers of State.lens."""
+        return self.camera[:, :, PER_PHOTO:]
 
 
 def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
-    xy, p = _ideal(state, bundle)
-    x, y = xy.T
+    xy, in_camera = _ideal(state, bundle)
     of = bundle.camera_of[bundle.photo]
-    focal = (np.array([c.focal_px for c in bundle.cameras]) * np.exp(state.lens[:, 0]))[of]
-    distorted, by_k1, by_ideal = np.empty_like(xy), np.empty_like(xy), np.empty((len(x), 2, 2))
+    distorted, by_k1, by_ideal = np.empty_like(xy), np.empty_like(xy), np.empty((len(xy), 2, 2))
     for c, nominal in enumerate(bundle.cameras):
         mine = of == c
         lens = with_lens(nominal, state.lens[c]).distortion
@@ -213,27 +221,23 @@ def linearise(state: State, bundle: Bundle) -> tuple[Array, Jacobians]:
             lens.by_k1(xy[mine]),
             lens.slope(xy[mine]),
         )
-    zero, inverse = np.zeros(len(x)), 1.0 / p[:, 2]
-    projection = np.stack([inverse, zero, -x * inverse, zero, inverse, -y * inverse], axis=1).reshape(
-        -1, 2, 3
-    )
-    by_camera = focal[:, None, None] * (by_ideal @ projection)
-    a, b, c = p.T
-    turning = np.stack([zero, -c, b, c, zero, -a, -b, a, zero], axis=1).reshape(-1, 3, 3)
-    R_transposed = np.swapaxes(state.R[bundle.photo], 1, 2)
-    moving = by_camera @ R_transposed
-    along = moving[:, :, :2]
-    if bundle.relief is not None:  # a point that moves on the surface rises and falls with it
-        along = along + moving[:, :, 2:] * bundle.relief.slope(state.X)[bundle.track][:, None, :]
-    shifts = np.broadcast_to(np.eye(2), (len(x), 2, 2))
-    seen = focal[:, None] * distorted + state.lens[of, 2:] + state.roll[bundle.photo] * bundle.rolled[:, None]
+    focal = (np.array([c.focal_px for c in bundle.cameras]) * np.exp(state.lens[:, 0]))[bundle.camera_of]
+    rolled = state.roll[bundle.photo] * bundle.rolled[:, None]
+    seen = focal[bundle.photo, None] * distorted + state.lens[of, 2:] + rolled
     residual = _as_taken(seen - bundle.xy, state, bundle)
-    height = np.array([c.height_px for c in bundle.cameras])[of]
-    foretold = bundle.rolled + residual[:, 1] / height  # of the row
-    pose = np.concatenate([by_camera @ turning, -moving, foretold[:, None, None] * np.eye(2)], axis=2)
-    lens_too = np.concatenate([focal[:, None, None] * np.stack([distorted, by_k1], axis=2), shifts], axis=2)
-    return residual, Jacobians(
-        pose=_as_taken(pose, state, bundle),
-        lens=_as_taken(lens_too, state, bundle),
-        point=np.ascontiguousarray(_as_taken(along, state, bundle)),
+    camera, point = differentiate(
+        bundle.photo,
+        bundle.track,
+        state.R,
+        focal,
+        _heights_px(bundle),
+        state.roll,
+        bundle.rolled,
+        in_camera,
+        distorted,
+        by_k1,
+        by_ideal,
+        np.zeros_like(state.X) if bundle.relief is None else bundle.relief.slope(state.X),
+        residual,
     )
+    return residual, Jacobians(camera, point)

@@ -44,7 +44,7 @@ def reduced(
 ) -> Reduced:
     """weight: (M,) of the observations, 1/px²; trust: (n,) factors on the weights of the prior positions."""
     n, size = len(state.C), PER_PHOTO * len(state.C) + bundle.shared
-    camera = np.concatenate([jacobians.pose, jacobians.lens], axis=2)  # (M, 2, 12)
+    camera = jacobians.camera
     columns = np.concatenate(
         [
             PER_PHOTO * bundle.photo[:, None] + np.arange(PER_PHOTO),
@@ -80,8 +80,7 @@ def damped_step(
     system = reduced(state, bundle, residual, jacobians, weight, trust, damping)
     d = solve_positive(system.S, -system.g, bundle.shared)
     pose, lens = d[: PER_PHOTO * n].reshape(n, PER_PHOTO), d[PER_PHOTO * n : size - 3].reshape(-1, PER_CAMERA)
-    pulled = np.einsum("mki,mi->mk", system.mixed, d[system.columns])
-    back = -system.h - _by_track(pulled, bundle.track, len(state.X))
+    back = -system.h - _pulled(system.mixed, d, system.columns, bundle.track, len(state.X))
     return State(
         R=state.R @ rotation(pose[:, :3]),
         C=state.C + pose[:, 3:6],
@@ -107,10 +106,13 @@ def _add_observations(
     width = camera.shape[2]
     for m in range(len(weight)):
         x, y = weight[m] * camera[m, 0], weight[m] * camera[m, 1]
+        own, lens = columns[m, 0], columns[m, PER_PHOTO]
         for i in range(width):
             row = A[columns[m, i]]
-            for j in range(width):
-                row[columns[m, j]] += x[i] * camera[m, 0, j] + y[i] * camera[m, 1, j]
+            for j in range(PER_PHOTO):
+                row[own + j] += x[i] * camera[m, 0, j] + y[i] * camera[m, 1, j]
+            for j in range(PER_PHOTO, width):
+                row[lens + j - PER_PHOTO] += x[i] * camera[m, 0, j] + y[i] * camera[m, 1, j]
             g[columns[m, i]] += x[i] * residual[m, 0] + y[i] * residual[m, 1]
             for k in range(2):
                 mixed[m, k, i] = point[m, 0, k] * x[i] + point[m, 1, k] * y[i]
@@ -143,21 +145,40 @@ def _eliminate(
                     row[lens + j] += y0 * mixed[other, 0, PER_PHOTO + j] + y1 * mixed[other, 1, PER_PHOTO + j]
 
 
-def _by_track(values: Array, track: Index, tracks: int) -> Array:
-    """(tracks, K) sums of (M, K)."""
-    return np.stack([np.bincount(track, column, minlength=tracks) for column in values.T], axis=1)
+@numba.njit(cache=True, nogil=True)
+def _pulled(mixed: Array, d: Array, columns: Index, track: Index, tracks: int) -> Array:
+    """(tracks, 2) of what a step d of the photos and the shared unknowns does to the tracks' equations."""
+    pulled = np.zeros((tracks, 2))
+    for m in range(len(track)):
+        for i in range(columns.shape[1]):
+            for k in range(2):
+                pulled[track[m], k] += mixed[m, k, i] * d[columns[m, i]]
+    return pulled
 
 
 def _point_blocks(
     point: Array, weight: Array, residual: Array, track: Index, tracks: int, damping: float
 ) -> tuple[Array, Array]:
     """(T, 2, 2) inverse damped blocks and (T, 2) gradients of the points."""
-    blocks = np.einsum("mki,mkj,m->mij", point, point, weight).reshape(-1, 4)
-    a, b, _, d = _by_track(blocks, track, tracks).T
-    a, d = a * (1.0 + damping), d * (1.0 + damping)
+    blocks, pulls = np.zeros((tracks, 2, 2)), np.zeros((tracks, 2))
+    _add_points(blocks, pulls, point, weight, residual, track)
+    a, b, d = blocks[:, 0, 0] * (1.0 + damping), blocks[:, 0, 1], blocks[:, 1, 1] * (1.0 + damping)
     inverse = np.stack([d, -b, -b, a], axis=1) / (a * d - b * b)[:, None]
-    pulls = np.einsum("mki,mk,m->mi", point, residual, weight)
-    return inverse.reshape(-1, 2, 2), _by_track(pulls, track, tracks)
+    return inverse.reshape(-1, 2, 2), pulls
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_points(
+    blocks: Array, pulls: Array, point: Array, weight: Array, residual: Array, track: Index
+) -> None:
+    """In place: what every observation says of its track."""
+    for m in range(len(track)):
+        t = track[m]
+        for i in range(2):
+            x, y = weight[m] * point[m, 0, i], weight[m] * point[m, 1, i]
+            pulls[t, i] += x * residual[m, 0] + y * residual[m, 1]
+            for j in range(2):
+                blocks[t, i, j] += x * point[m, 0, j] + y * point[m, 1, j]
 
 
 def _add_priors(A: Array, g: Array, state: State, bundle: Bundle, trust: Array) -> None:

@@ -85,7 +85,7 @@ def _middles(state: State, bundle: Bundle, size: int) -> tuple[Array, Array]:
     photo = np.arange(n)
     seen = replace(bundle, photo=photo, track=photo, xy=np.zeros((n, 2)), rolled=np.zeros(n))
     _, jacobians = linearise(replace(state, X=X), seen)
-    moves = -np.linalg.solve(jacobians.point, np.concatenate([jacobians.pose, jacobians.lens], axis=2))
+    moves = -np.linalg.solve(jacobians.point, jacobians.camera)
     J = np.zeros((n, 2, size))
     J[photo[:, None], :, PER_PHOTO * photo[:, None] + np.arange(PER_PHOTO)] = np.swapaxes(
         moves[:, :, :PER_PHOTO], 1, 2
