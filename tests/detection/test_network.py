@@ -49,6 +49,19 @@ def test_a_guest_finds_the_crack_that_it_can_see() -> None:
     assert found.scores and all(one.score >= settings.min_score for one in found.scores)
 
 
+def test_the_middle_of_a_soft_shadow_is_no_crack() -> None:
+    """A crack and the shadow of a bar, both of which the network sees."""
+    rgb = rough(300, 400, contrast=0.01)
+    truth = with_crack(rgb, 80, 5, 0.9, 20, 380)
+    light = 1.0 - 0.9 * np.exp(-(((np.arange(300) - 220.0) / 14.0) ** 2))
+    shaded = np.rint(rgb * light[:, None, None]).astype(np.uint8)
+    assert (probability(ArrayRaster(shaded), GUEST)[220, 20:380] > 128).all()
+    settings = DetectSettings(method="onnx", model="guest.onnx")
+    found = detect_image(shaded, None, settings, None, model=GUEST)
+    assert (found.mask & truth).sum() > 0.5 * truth.sum() and not found.mask[150:].any()
+    assert [round(y, -1) for _, y in found.stains] == [220.0]
+
+
 @pytest.mark.parametrize(("width", "gsd_mm_px"), [(25, None), (45, None), (75, None), (5, 0.2)])
 def test_a_crack_through_a_small_image_is_found(width: int, gsd_mm_px: float | None) -> None:
     """227 px, as published sets are cut: up to a third of it across, and no end of it to be seen; or all of
