@@ -11,6 +11,7 @@ SUPERSAMPLED = 8  # of the truth, along each axis
 VISIBLE = 0.2  # a pixel belongs to a crack that covers this share of what its blurred area sees
 SMOOTH = 0.3  # share of cracks without roughness
 FAINT, FAINT_RMS = 0.3, (2.0, 6.0)  # share of cracks that are so many RMS of the texture darker
+LEAST_RMS = 0.02  # of any surface's texture
 GAP_PX, WIDEST_PX = 10.0, 50.0  # from where on a crack is a gap, and dark; and the widest
 # Shares of the heading's roughness at each correlation length in pixels: a crack goes around grains of every
 # size. Chords of 8, 16, 32 and 64 px turn by 21, 25, 27 and 33° RMS with branches; real ones by 19 to 26°.
@@ -81,6 +82,11 @@ def cracks_on(rng: Rng, side_m: float, px_m: float, rms: float) -> Cracks:
     return tuple(cracks)
 
 
+def faint(rng: Rng, rms: float) -> float:
+    """The share of light that a crack leaves which stands out little from a texture of `rms`."""
+    return float(np.exp(-min(rng.uniform(*FAINT_RMS) * max(rms, LEAST_RMS), 1.5)))
+
+
 def one_crack(
     rng: Rng,
     start: Array,
@@ -107,7 +113,7 @@ def one_crack(
     )
     kept = float(np.exp(rng.uniform(np.log(0.12), np.log(0.8 if width_px < GAP_PX else 0.4))))
     if width_px < GAP_PX and rng.random() < FAINT:
-        kept = float(np.exp(-min(rng.uniform(*FAINT_RMS) * rms, 1.5)))
+        kept = faint(rng, rms)
     if trunk is not None:
         width_px = float(np.median(trunk.left_m + trunk.right_m)) / px_m * rng.uniform(0.35, 0.9)
         kept = float(trunk.kept_light.mean())

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from skimage.morphology import skeletonize
 
-from training.cracks import DOUBTFUL, FAINT, FAINT_RMS, VISIBLE, cracks_on, seen, told
+from training.cracks import DOUBTFUL, FAINT, VISIBLE, cracks_on, faint, seen, told
 
 SIDE_PX = 224
 ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
@@ -143,7 +143,7 @@ def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:
     share = seen(cracks_on(rng, SIDE_PX, 1.0, texture), SIDE_PX, SIDE_PX, 1.0)
     kept = np.exp(rng.uniform(np.log(0.12), np.log(0.88)))
     if rng.random() < FAINT:
-        kept = np.exp(-min(rng.uniform(*FAINT_RMS) * texture, 1.5))
+        kept = faint(rng, texture)
     cracked = rgb * (1.0 - share * np.float32(1.0 - kept))[..., None]
     drawn = told(cracked, 255 * (share >= VISIBLE).astype(np.uint8))
     crack = (drawn == 255).astype(np.uint8)
