@@ -3,6 +3,7 @@
 import os
 import socket
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 from uuid import UUID
 
@@ -27,7 +28,7 @@ KILLED = "Its process was killed. Run it again to go on: finished stages are kep
 def note_process(flow: Flow[..., Any], flow_run: FlowRun, state: State[Any]) -> None:
     """Hook of a flow that starts to run: the run says on which machine and by which process."""
     with get_client(sync_client=True) as client:
-        client.update_flow_run(flow_run.id, infrastructure_pid=f"{socket.gethostname()}:{os.getpid()}")
+        client.update_flow_run(flow_run.id, infrastructure_pid=f"{_here()}:{os.getpid()}")
 
 
 def mark_dead_runs() -> int:
@@ -42,9 +43,18 @@ def mark_dead_runs() -> int:
     return marked
 
 
+def _here() -> str:
+    """This machine, and whose processes are numbered together: a container may have the machine's name."""
+    try:
+        space = Path("/proc/self/ns/pid").stat().st_ino
+    except OSError:
+        space = 0
+    return f"{socket.gethostname()}/{space}"
+
+
 def _is_dead(run: FlowRun) -> bool:
-    host, _, pid = (run.infrastructure_pid or "").rpartition(":")
-    if host != socket.gethostname() or not pid.isdigit():
+    where, _, pid = (run.infrastructure_pid or "").rpartition(":")
+    if os.name != "posix" or where != _here() or not pid.isdigit():
         return False
     try:
         os.kill(int(pid), 0)

@@ -8,7 +8,7 @@ from tasks.stitching.tracks import Index
 from tasks.stitching.view import Array
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def differentiate(
     photo: Index,
     track: Index,
