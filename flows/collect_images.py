@@ -4,16 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from prefect import flow
-
 from artifacts import store
 from flows.battery_change import wait_for_battery
-from flows.dead_runs import note_process
 from flows.external_flight import photos_and_logs
 from flows.given_photos import PhotoSource, given_photos, position_sigma_m
+from flows.inspection_flow import inspection_flow
 from flows.model_structure import has_scans, model
 from flows.opening import opened
-from flows.workers import one_a_core
 from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
 from schemas.geodesy import GeoOrigin
@@ -203,13 +200,7 @@ def _simulated_wall(simulation: SimulationInput) -> Collected:
     return Collected(photos=photos, surfaces=(taken.surface,))
 
 
-@flow(
-    name="collect-images",
-    description=__doc__,
-    persist_result=False,
-    task_runner=one_a_core(),
-    on_running=[note_process],
-)
+@inspection_flow("collect-images", __doc__)
 def collect_images(inspection: str = "demo:bridge", out: str | None = None) -> None:
     """inspection: path of the YAML file (or demo:bridge); out: the run's folder."""
     with opened(inspection, out) as open_run:

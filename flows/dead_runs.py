@@ -31,16 +31,13 @@ def note_process(flow: Flow[..., Any], flow_run: FlowRun, state: State[Any]) -> 
         client.update_flow_run(flow_run.id, infrastructure_pid=f"{_here()}:{os.getpid()}")
 
 
-def mark_dead_runs() -> int:
-    """As crashed, with the tasks they were in, every run of this machine whose process is gone; how many. A
-    server that does not let us is left as it is: nothing hangs on it."""
+def mark_dead_runs() -> None:
+    """As crashed, with the tasks they were in, every run of this machine whose process is gone. A server that
+    does not let us is left as it is: nothing hangs on it."""
     running = FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=[StateType.RUNNING])))
-    marked = 0
     with suppress(httpx.HTTPError), get_client(sync_client=True) as client:
         for run in filter(_is_dead, client.read_flow_runs(flow_run_filter=running)):
             _mark(client, run.id)
-            marked += 1
-    return marked
 
 
 def _here() -> str:

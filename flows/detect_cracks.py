@@ -6,16 +6,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
 
-from prefect import flow
-
 from artifacts import store
 from flows.collect_images import collect
-from flows.dead_runs import note_process
 from flows.given_photos import PhotoSource
 from flows.inspection_file import existing
+from flows.inspection_flow import inspection_flow
 from flows.model_structure import Modelled, has_scans, model
 from flows.opening import opened
-from flows.workers import one_a_core
 from schemas.crack import Measurement
 from schemas.detection import Detection, Patterns
 from schemas.inspection import Inspection
@@ -131,13 +128,7 @@ def _mosaics(
     return [*alone, *stitch.each(calls)]
 
 
-@flow(
-    name="detect-cracks",
-    description=__doc__,
-    persist_result=False,
-    task_runner=one_a_core(),
-    on_running=[note_process],
-)
+@inspection_flow("detect-cracks", __doc__)
 def detect_cracks(inspection: str = "demo:wall", out: str | None = None) -> None:
     """inspection: path of the YAML file (or demo:wall); out: the run's folder."""
     with opened(inspection, out) as run:

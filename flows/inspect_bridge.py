@@ -3,14 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from prefect import flow
-
 from flows.collect_images import Collected, collect
-from flows.dead_runs import note_process
 from flows.detect_cracks import Detected, detect_in_photos
+from flows.inspection_flow import inspection_flow
 from flows.model_structure import Modelled, has_scans, model
 from flows.opening import OpenRun, opened
-from flows.workers import one_a_core
 from schemas.crack_report import CrackReport
 from schemas.inspection import PhotoSet
 from schemas.problem import BadInput
@@ -18,13 +15,7 @@ from schemas.surface import Surface
 from tasks.assessment.task import assess, write_report
 
 
-@flow(
-    name="inspect-bridge",
-    description=__doc__,
-    persist_result=False,
-    task_runner=one_a_core(),
-    on_running=[note_process],
-)
+@inspection_flow("inspect-bridge", __doc__)
 def inspect_bridge(
     inspection: str = "demo:bridge",
     out: str | None = None,

@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from prefect import flow
-
 from artifacts import store
-from flows.dead_runs import note_process
 from flows.inspection_file import existing
+from flows.inspection_flow import inspection_flow
 from flows.opening import opened
-from flows.workers import one_a_core
 from schemas.inspection import Inspection, ScanInput
 from schemas.problem import BadInput, LeftOut
 from schemas.registered_model import RegisteredModel
@@ -78,13 +75,7 @@ def seen_targets(given: ScanInput) -> tuple[SeenTarget, ...]:
     return tuple(SeenTarget(name=name, position=place) for name, place in given.targets.items())
 
 
-@flow(
-    name="model-structure",
-    description=__doc__,
-    persist_result=False,
-    task_runner=one_a_core(),
-    on_running=[note_process],
-)
+@inspection_flow("model-structure", __doc__)
 def model_structure(inspection: str = "demo:bridge", out: str | None = None) -> None:
     """inspection: path of the YAML file (or demo:bridge); out: the run's folder."""
     with opened(inspection, out) as run:

@@ -16,6 +16,8 @@ from schemas.problem import BadInput
 
 
 def serve_everything(port: int, report_port: int) -> int:
+    from flows.dead_runs import mark_dead_runs
+
     url = f"http://127.0.0.1:{port}/api"
     os.environ["PREFECT_API_URL"] = url
     os.environ["PREFECT_LOGGING_LEVEL"] = "INFO"  # the dashboard shows the log of each run
@@ -23,7 +25,7 @@ def serve_everything(port: int, report_port: int) -> int:
     host = host_reports(Path("runs"), report_port)
     server = None if answers(url) else _start_server(port, url)
     try:
-        _mark_dead_runs()
+        mark_dead_runs()
         out.print(f"Dashboard: http://127.0.0.1:{port}   Reports: http://127.0.0.1:{report_port}")
         serve_deployments()
     finally:
@@ -32,14 +34,6 @@ def serve_everything(port: int, report_port: int) -> int:
             server.terminate()
             server.wait(timeout=20)
     return 0
-
-
-def _mark_dead_runs() -> None:
-    from flows.dead_runs import mark_dead_runs
-
-    count = mark_dead_runs()
-    if count:
-        out.print(f"{count} killed run(s) marked as crashed: run them again to go on.")
 
 
 def serve_deployments() -> None:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from tasks.stitching.blending import ALIGN, REACH, MultiBand
 from tasks.stitching.canvas import Canvas
 from tasks.stitching.gain import Light, gain_table, relit
-from tasks.stitching.seams import NONE, Labels, Partition, label_window, partition, photo_map
+from tasks.stitching.seams import Labels, Partition, label_window, partition, photo_map
 from tasks.stitching.view import View, shrunk
 
 Pixels = npt.NDArray[np.uint8]
@@ -41,17 +41,17 @@ class PhotoCache:
 
     def __call__(self, index: int) -> Pixels:
         with self._lock:
-            found = self._kept.get(index)
-            mine = self._kept.setdefault(index, Future()) if found is None else found
+            first = index not in self._kept
+            photo = self._kept.setdefault(index, Future())
             self._kept.move_to_end(index)
-        if found is None:
+        if first:
             try:
-                mine.set_result(self._read(index))
+                photo.set_result(self._read(index))
             except BaseException as problem:
-                mine.set_exception(problem)
+                photo.set_exception(problem)
                 raise
             self._forget()
-        return mine.result()
+        return photo.result()
 
     def _forget(self) -> None:
         with self._lock:
@@ -138,12 +138,7 @@ def _tile(
 
 def _boxes(label: Labels) -> Iterator[tuple[int, tuple[int, int, int, int]]]:
     """Every photo in sight, and the left, right, top and bottom of its land; right and bottom excluded."""
-    lowest, highest = int(label.min()), int(label.max())
-    if highest == NONE:
-        return
-    boxes = _extents(label, highest + 1)
-    for i in range(max(lowest, 0), highest + 1):
-        left, right, top, bottom = map(int, boxes[i])
+    for i, (left, right, top, bottom) in enumerate(_extents(label, int(label.max()) + 1).tolist()):
         if right > 0:
             yield i, (left, right, top, bottom)
 

@@ -50,7 +50,7 @@ def differentiate(
             camera[m, i, 8], camera[m, i, 9], camera[m, i, 10 + i] = f * distorted[m, i], f * by_k1[m, i], 1.0
             for j in range(2):  # a point that moves on the surface rises and falls with it
                 point[m, i, j] = moving[i, j] + moving[i, 2] * slope[track[m], j]
-        across, along = roll[k] / height[k]
+        across, along = roll[k] / height[k]  # as taken: what bundle makes of the residuals too
         for j in range(12):
             camera[m, 1, j] /= 1.0 - along
             camera[m, 0, j] += across * camera[m, 1, j]

@@ -46,7 +46,8 @@ def window(rays_m: Floats) -> ScanWindow:
     high, nor lower than its lowest echo. One that saw less than half the circle was aimed, and looked no
     higher than its highest echo, nor did one whose head turns no further; any other saw the sky."""
     east, north, up = rays_m.T
-    seen = np.unique(np.floor(np.degrees(np.arctan2(north, east)) % 360.0).astype(np.int64) % 360)
+    azimuth = np.floor(np.degrees(np.arctan2(north, east)) % 360.0).astype(np.int64) % 360
+    seen = np.unique(azimuth)
     gaps = np.diff(seen, append=seen[0] + 360) - 1
     wide = gaps > WIDEST_GAP_DEG
     blind = tuple(
@@ -54,14 +55,13 @@ def window(rays_m: Floats) -> ScanWindow:
     )
     elevation = np.degrees(np.arctan2(up, np.hypot(east, north)))
     aimed = gaps[wide].sum() > 180
-    highest = float(elevation.max()) if aimed else _stop(rays_m, elevation)
+    highest = float(elevation.max()) if aimed else _stop(rays_m, azimuth, elevation)
     return ScanWindow(blind_deg=blind, lowest_deg=float(elevation.min()), highest_deg=highest)
 
 
-def _stop(rays_m: Floats, elevation: Floats) -> float:
+def _stop(rays_m: Floats, azimuth: npt.NDArray[np.int64], elevation: Floats) -> float:
     """Where the scanner's head turns no further up: there its highest echoes end alike, whatever they are of;
     90 where they do not."""
-    azimuth = np.floor(np.degrees(np.arctan2(rays_m[:, 1], rays_m[:, 0])) % 360.0).astype(np.int64) % 360
     by_azimuth = np.lexsort((elevation, azimuth))
     last = np.flatnonzero(np.diff(azimuth[by_azimuth], append=360))
     top = by_azimuth[last]  # the highest echo of each degree

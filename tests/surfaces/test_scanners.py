@@ -17,8 +17,8 @@ def echoes(azimuth_deg: tuple[float, float], elevation_deg: tuple[float, float])
 
 
 def skyline(least_deg: float, most_deg: float, head_deg: float = 90.0) -> Floats:
-    """Things all round, every 20° as high as it happens, at another distance; seen by a
-    head that turns up so far."""
+    """Things all round, every 20° as high as it happens, at another distance; seen by a head that turns up so
+    far."""
     rng = np.random.default_rng(0)
     things = []
     for azimuth in range(0, 360, 20):
@@ -53,7 +53,7 @@ def test_a_head_that_turns_no_further_saw_no_sky() -> None:
     assert window(among).highest_deg == pytest.approx(39.5, abs=0.6)
 
 
-def test_a_flat_ceiling_or_roof_that_ends_is_no_stop() -> None:
+def test_the_top_of_walls_is_no_stop() -> None:
     """A square yard between walls of 10 m, 12 m wide: no side is as high all along."""
     turn, up = np.radians(np.arange(0.25, 360, 0.5)), np.radians(np.arange(-60.0, 89.0, 0.5))
     a, e = (angle.ravel() for angle in np.meshgrid(turn, up))

@@ -63,6 +63,19 @@ def test_a_crack_drawn_on_a_photo_is_dark_and_true() -> None:
     assert np.median(contrast) > 0.06  # some are faint
 
 
+def test_gaps_are_dark_and_some_cracks_hardly_darker_than_the_texture() -> None:
+    rms = 0.05
+    cracks = [
+        one_crack(np.random.default_rng(seed), np.full(2, 500.0), 0.0, 1000.0, 1.0, rms)
+        for seed in range(400)
+    ]
+    width = np.array([np.median(one.left_m + one.right_m) for one in cracks])
+    dark = np.array([-np.log(one.kept_light.mean()) for one in cracks])
+    assert (width > 25).any() and dark[width > 15].min() > 0.5
+    faint = (dark > 1.0 * rms) & (dark < 7.0 * rms)
+    assert 0.2 < faint.mean() < 0.5 and faint[width < 5].any()
+
+
 @pytest.mark.parametrize("chord_px", [8, 16, 32, 64])
 def test_cracks_turn_as_real_ones_do(chord_px: int) -> None:
     """Real ones by 19 to 26° RMS from chord to chord of any length (bench-detection, part turns), counted
