@@ -69,21 +69,28 @@ def at_least(least: int, levels: npt.NDArray[np.uint8], top: int, left: int) -> 
     return Part(y.astype(np.int32) + np.int32(top), x.astype(np.int32) + np.int32(left), levels[y, x])
 
 
-def connected(pixels: Marked) -> tuple[Indices, int]:
+def connected(pixels: Marked, reach_px: int = 0) -> tuple[Indices, int]:
     """(n,) label of each pixel's 8-connected component, 1 and up in the order of their first pixels, and how
-    many there are."""
+    many there are. What 2 reach_px other pixels at most lie between, along either axis, hangs together too."""
     label = np.zeros(len(pixels.y), dtype=np.int32)
     bands = _Bands(pixels.width_px)
     for top in range(0, pixels.height_px, BAND_PX):
         bottom = min(pixels.height_px, top + BAND_PX)
+        count, labels = cv2.connectedComponents(_grown(pixels, top, bottom, reach_px), connectivity=8)
         here = slice(*np.searchsorted(pixels.y, (top, bottom)))
-        dense = np.zeros((bottom - top, pixels.width_px), dtype=np.uint8)
-        y, x = pixels.y[here] - top, pixels.x[here]
-        dense[y, x] = 1
-        count, labels = cv2.connectedComponents(dense, connectivity=8)
-        label[here] = labels[y, x] + bands.count
+        label[here] = labels[pixels.y[here] - top, pixels.x[here]] + bands.count
         bands.add(np.asarray(labels, dtype=np.int32), count - 1)
     return _in_order(bands.joined()[label])
+
+
+def _grown(pixels: Marked, top: int, bottom: int, reach_px: int) -> npt.NDArray[np.uint8]:
+    """(bottom - top, W): 1 where a pixel is at most reach_px away along either axis."""
+    near = slice(*np.searchsorted(pixels.y, (top - reach_px, bottom + reach_px)))
+    dense = np.zeros((bottom - top + 2 * reach_px, pixels.width_px), dtype=np.uint8)
+    dense[pixels.y[near] - top + reach_px, pixels.x[near]] = 1
+    side = 2 * reach_px + 1
+    grown = cv2.dilate(dense, np.ones((side, side), np.uint8)) if reach_px else dense
+    return np.asarray(grown[reach_px : reach_px + bottom - top], dtype=np.uint8)
 
 
 class Regions(NamedTuple):

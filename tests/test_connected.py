@@ -28,6 +28,19 @@ def test_labels_are_those_of_the_whole_image_in_the_order_of_first_pixels(seed: 
     assert (np.diff(first) > 0).all() and label[0] == 1
 
 
+@given(st.integers(0, 999), st.integers(1, 6))
+@settings(max_examples=10)
+def test_what_a_gap_lies_between_hangs_together_as_when_all_is_grown(seed: int, reach_px: int) -> None:
+    mask = np.random.default_rng(seed).random((1400, 90)) < 0.01
+    grown = cv2.dilate(mask.astype(np.uint8), np.ones((2 * reach_px + 1,) * 2, np.uint8))
+    count, labels = cv2.connectedComponents(grown, connectivity=8)
+    pixels = Marked.of(BitMask.of(mask))
+    label, found = connected(pixels, reach_px)
+    theirs = labels[pixels.y, pixels.x]
+    assert found == count - 1
+    assert len({*zip(theirs.tolist(), label.tolist(), strict=True)}) == found  # one to one
+
+
 @given(st.integers(0, 999))
 @settings(max_examples=10)
 def test_regions_have_the_same_areas_and_pixels(seed: int) -> None:

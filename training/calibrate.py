@@ -18,8 +18,7 @@ import numpy.typing as npt
 
 from schemas.raster import ArrayRaster
 from tasks.connected import Marked
-from tasks.detection.candidates import STRONGEST, features
-from tasks.detection.components import components
+from tasks.detection.candidates import STRONGEST, candidates, features
 from tasks.detection.network import OUR_LIMITS, Model, Probability, probability
 from training.cracks import DOUBTFUL
 from training.photos import by_fold
@@ -81,8 +80,9 @@ def fit_pixels(pairs: list[tuple[Probability, Mask]]) -> Floats:
 
 def judged(p: Probability, truth: Mask, least_px: float) -> tuple[Floats, Mask]:
     """Features of the long and thin candidates, and which of them are cracks."""
-    found = components(Marked.of_levels(np.where(p >= OUR_LIMITS.edge, p, np.uint8(0))))
-    which = found.holding(found.pixels.level >= OUR_LIMITS.sure) & (found.extent_px >= least_px) & found.thin
+    likely = Marked.of_levels(np.where(p >= OUR_LIMITS.edge, p, np.uint8(0)))
+    found = candidates(likely, OUR_LIMITS).found
+    which = (found.extent_px >= least_px) & found.thin
     which[0] = False
     reach = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEAR_PX + 1, 2 * NEAR_PX + 1))
     near = cv2.dilate(truth.astype(np.uint8), reach) > 0

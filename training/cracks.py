@@ -60,7 +60,7 @@ def told(rgb: npt.NDArray[np.float32], truth: npt.NDArray[np.uint8]) -> npt.NDAr
         )
 
     around = mean(grey, free, 2 * STRETCH_PX + 1)
-    rms = np.sqrt(mean((fine - around) ** 2, free, 2 * STRETCH_PX + 1))
+    rms = np.sqrt(np.maximum(mean((fine - around) ** 2, free, 2 * STRETCH_PX + 1), 0.0))
     dark = mean(around - fine, crack, STRETCH_PX)
     least = LEAST_DARK * rms + 0.01  # of the brightness, where there is no texture at all
     return np.where((crack > 0) & (dark < least), np.uint8(DOUBTFUL), truth)

@@ -1,9 +1,10 @@
 """From probabilities to cracks: what hangs together is judged as a whole.
 
-A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). Its score is the
-probability that a candidate of its strength and straightness is a crack, fitted on photos and
-surfaces that the network had not seen (training.calibrate): so one threshold stands for one rate of false
-alarms.
+A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). Pieces that are hardly
+apart, as where the edge of a shadow crosses a crack, are one candidate: half a crack is often as straight as a
+joint. Its score is the probability that a candidate of its strength and straightness is a crack, fitted on
+photos and surfaces that the network had not seen (training.calibrate): so one threshold stands for one rate of
+false alarms.
 """
 
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from tasks.connected import Marked
 from tasks.detection.components import Components, components
 from tasks.detection.network import Limits
 
+REACH_PX = 5  # pieces of a crack are at most twice as far apart; from half to four times that nothing changes
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
 WEIGHTS = (1.843, -1.515, -0.454, -1.599)  # of the features, from training.calibrate
 
@@ -40,11 +42,12 @@ class Candidates(NamedTuple):
 
 
 def candidates(pixels: Marked, limits: Limits) -> Candidates:
-    """Connected pixels that hold one of at least `sure`, each with its score. pixels: those of at least
-    `edge`; their level is 255 × the probability."""
-    found = components(pixels)
-    sure = found.holding(pixels.level >= limits.sure)
-    score = np.where(sure, score_of(features(found)), 0.0)
+    """What hangs together of the connected pixels that hold one of at least `sure`, each with its score.
+    pixels: those of at least `edge`; their level is 255 × the probability."""
+    pieces = components(pixels)
+    sure = pieces.keep(pieces.holding(pixels.level >= limits.sure))
+    found = components(sure, REACH_PX)
+    score = score_of(features(found))
     score[0] = 0.0
     return Candidates(found, score)
 

@@ -12,7 +12,7 @@ THROUGH = 2.7  # of one that runs through the image; a disc has 2.5
 
 
 class Components(NamedTuple):
-    """8-connected components of some pixels. Arrays are indexed by label; label 0 is none of them."""
+    """Components of some pixels: what hangs together. Arrays are indexed by label; label 0 is none of them."""
 
     pixels: Marked
     label: Indices  # (n,) of each pixel, 1 and up
@@ -51,8 +51,9 @@ class Components(NamedTuple):
         return self.pixels.where(which[self.label])
 
 
-def components(pixels: Marked) -> Components:
-    label, count = connected(pixels)
+def components(pixels: Marked, reach_px: int = 0) -> Components:
+    """8-connected ones, or with gaps of at most 2 reach_px."""
+    label, count = connected(pixels, reach_px)
     area = np.bincount(label, minlength=count + 1).astype(np.float64)
     low = np.full((count + 1, 2), np.iinfo(np.int32).max, dtype=np.int32)
     high = np.full((count + 1, 2), -1, dtype=np.int32)

@@ -98,7 +98,7 @@ def _by_network(
         count_valid(raster),
         tuple(joints),
         tuple(stains),
-        scores=given.at(given.found.holding(mask.at(pixels.y, pixels.x))),
+        scores=given.at(given.found.holding(mask.at(given.found.pixels.y, given.found.pixels.x))),
         doubtful=given.at(long & ~likely & (given.score >= WORTH_SAYING)),
     )
 

@@ -4,7 +4,7 @@ import pytest
 
 from tasks.connected import Marked
 from tasks.detection import candidates as judged
-from tasks.detection.candidates import Candidates, features, strength
+from tasks.detection.candidates import REACH_PX, Candidates, features, strength
 from tasks.detection.components import Components, components
 from tasks.detection.network import OUR_LIMITS, USUAL_LIMITS, Limits
 
@@ -41,7 +41,7 @@ def test_strength_is_that_of_the_middle_and_not_of_the_rim() -> None:
 
 def test_a_candidate_needs_a_pixel_that_is_sure() -> None:
     faint, sure = (candidates(line((level,)), OUR_LIMITS) for level in (SURE - 1, SURE))
-    assert faint.score[1] == 0.0 < sure.score[1]
+    assert faint.score.tolist() == [0.0] and sure.score[1] > 0.0
     assert candidates(np.zeros((5, 5), np.uint8), OUR_LIMITS).score.tolist() == [0.0]
 
 
@@ -66,6 +66,21 @@ def test_bend_is_least_for_a_ruled_line_and_none_for_a_ring() -> None:
         features(found)[label_at(found, y, x), 1] for x, y in ((10, 20), (10, 120), (168, 175))
     )
     assert of_line < -4.0 < of_wave < -1.0 < of_ring <= 0.0
+
+
+def test_pieces_hardly_apart_are_one_candidate() -> None:
+    p = line((250, 250))
+    whole = candidates(p, OUR_LIMITS).score[1]
+    p[:, 48 : 48 + 2 * REACH_PX] = 0
+    assert candidates(p, OUR_LIMITS).score.tolist() == pytest.approx([0.0, whole], abs=0.02)
+    p[:, 48 + 2 * REACH_PX] = 0
+    assert len(candidates(p, OUR_LIMITS).score) == 3
+
+
+def test_a_piece_that_is_not_sure_itself_joins_none() -> None:
+    p = line((250, 250))
+    p[15, 20:80] = SURE - 1
+    assert set(candidates(p, OUR_LIMITS).found.pixels.y.tolist()) == {10, 11}
 
 
 def test_a_score_says_where() -> None:
