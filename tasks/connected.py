@@ -71,7 +71,7 @@ def at_least(least: int, levels: npt.NDArray[np.uint8], top: int, left: int) -> 
 
 def connected(pixels: Marked, reach_px: int = 0) -> tuple[Indices, int]:
     """(n,) label of each pixel's 8-connected component, 1 and up in the order of their first pixels, and how
-    many there are. What 2 reach_px other pixels at most lie between, along either axis, hangs together too."""
+    many there are. Across gaps of at most 2 reach_px pixels along either axis it hangs together too."""
     label = np.zeros(len(pixels.y), dtype=np.int32)
     bands = _Bands(pixels.width_px)
     for top in range(0, pixels.height_px, BAND_PX):

@@ -194,12 +194,12 @@ def _dappled(rgb: Floats, rng: Rng) -> Floats:
 
 
 def _barred(rgb: Floats, rng: Rng) -> Floats:
-    """Under the narrow shadows of some rails or cables: side by side, straight or bent, their edges smooth."""
+    """Under the narrow shadows of some rails or cables, side by side, straight or bent, with smooth edges."""
     bend_px = float(np.exp(rng.uniform(np.log(80.0), np.log(8000.0))))
     middle, angle = rng.uniform(0.0, SIDE_PX, 2), rng.uniform(0.0, 2.0 * np.pi)
+    centre_x, centre_y = middle + bend_px * np.array([np.cos(angle), np.sin(angle)])
     y, x = np.mgrid[:SIDE_PX, :SIDE_PX].astype(np.float32)
-    centre = middle + bend_px * np.array([np.cos(angle), np.sin(angle)])
-    across = np.hypot(x - centre[0], y - centre[1]) - bend_px
+    across = np.hypot(x - centre_x, y - centre_y) - bend_px
     sharp = np.zeros((SIDE_PX, SIDE_PX), np.float32)
     for off_px in (0.0, *rng.normal(0.0, 0.2 * SIDE_PX, int(rng.integers(0, 3)))):
         half_px = 0.5 * float(np.exp(rng.uniform(np.log(2.0), np.log(60.0))))

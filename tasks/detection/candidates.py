@@ -1,10 +1,10 @@
 """From probabilities to cracks: what hangs together is judged as a whole.
 
-A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). Pieces that are hardly
-apart, as where the edge of a shadow crosses a crack, are one candidate: half a crack is often as straight as a
-joint. Its score is the probability that a candidate of its strength and straightness is a crack, fitted on
-photos and surfaces that the network had not seen (training.calibrate): so one threshold stands for one rate of
-false alarms.
+A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). Pieces that are
+hardly apart, as where the edge of a shadow crosses a crack, are one candidate: half a crack is often as
+straight as a joint. Its score is the probability that one of its strength and straightness is a crack,
+fitted on photos and surfaces that the network had not seen (training.calibrate): so one threshold stands for
+one rate of false alarms.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from tasks.connected import Marked
 from tasks.detection.components import Components, components
 from tasks.detection.network import Limits
 
-REACH_PX = 5  # pieces of a crack are at most twice as far apart; from half to four times that nothing changes
+REACH_PX = 5  # pieces of one crack are at most twice as far apart; at 5, 20 or 40 px all is alike
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
 WEIGHTS = (1.843, -1.515, -0.454, -1.599)  # of the features, from training.calibrate
 

@@ -12,7 +12,7 @@ THROUGH = 2.7  # of one that runs through the image; a disc has 2.5
 
 
 class Components(NamedTuple):
-    """Components of some pixels: what hangs together. Arrays are indexed by label; label 0 is none of them."""
+    """What of some pixels hangs together. Arrays are indexed by label; label 0 is none of them."""
 
     pixels: Marked
     label: Indices  # (n,) of each pixel, 1 and up
