@@ -1,4 +1,7 @@
-"""Multi-band blending (Burt & Adelson 1983): coarse bands mix over wide seams, fine ones over narrow."""
+"""Multi-band blending (Burt & Adelson 1983): coarse bands mix over wide seams, fine ones over narrow.
+
+The finest band, which no other photo has a say in, is asked of a layer where the layer is shown alone; all
+others of the layer at half its size, which goes as far as they mix."""
 
 import cv2
 import numba
@@ -6,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 Layer = npt.NDArray[np.float32]
+Mask = npt.NDArray[np.bool_]
 
 BANDS = 5  # the coarsest mixes over about 2⁵ pixels to either side
 ALIGN = 2**BANDS  # windows start on multiples of it, so that tiles are one blend
@@ -16,25 +20,47 @@ class MultiBand:
     """Blends layers into one window; the window's corner and size are multiples of ALIGN."""
 
     def __init__(self, width: int, height: int) -> None:
-        self._sum = [np.zeros((height >> k, width >> k, 3), np.float32) for k in range(BANDS + 1)]
-        self._weight = [np.zeros((height >> k, width >> k), np.float32) for k in range(BANDS + 1)]
+        self._finest = np.zeros((height, width, 3), np.float32)
+        sizes = [(height >> k, width >> k) for k in range(1, BANDS + 1)]
+        self._sum = [np.zeros((*size, 3), np.float32) for size in sizes]
+        self._weight = [np.zeros(size, np.float32) for size in sizes]
 
-    def add(self, layer: Layer, mask: Layer, x: int, y: int) -> None:
-        """`layer` (h, w, 3), valid all over; `mask` (h, w), 1 where it is wanted; corner, size aligned."""
-        for k in range(BANDS + 1):
-            window = (slice(y >> k, (y >> k) + mask.shape[0]), slice(x >> k, (x >> k) + mask.shape[1]))
-            lower: Layer = np.asarray(cv2.pyrDown(layer), np.float32) if k < BANDS else layer
-            coarse = np.asarray(cv2.pyrUp(lower), np.float32) if k < BANDS else np.zeros_like(layer)
-            _accumulate(self._sum[k][window], self._weight[k][window], layer, coarse, mask)
-            layer, mask = lower, np.asarray(cv2.pyrDown(mask), np.float32)
+    def add(self, half: Layer, mask: Layer, x: int, y: int) -> None:
+        """`half` (h / 2, w / 2, 3), valid all over, its pixels every second of the window's; `mask` (h, w),
+        1 where the layer is wanted; corner and size aligned."""
+        layer, share = half, np.asarray(cv2.pyrDown(mask), np.float32)
+        for k in range(BANDS):
+            top, left = y >> (k + 1), x >> (k + 1)
+            window = (slice(top, top + share.shape[0]), slice(left, left + share.shape[1]))
+            last = k == BANDS - 1
+            lower: Layer = layer if last else np.asarray(cv2.pyrDown(layer), np.float32)
+            coarse = np.zeros_like(layer) if last else np.asarray(cv2.pyrUp(lower), np.float32)
+            _accumulate(self._sum[k][window], self._weight[k][window], layer, coarse, share)
+            layer, share = lower, np.asarray(cv2.pyrDown(share), np.float32)
+
+    def add_finest(self, layer: Layer, half: Layer, mask: Mask, x: int, y: int) -> None:
+        """`layer` and `mask` (h, w): where it is wanted alone; `half` (h / 2 + 4, w / 2 + 4, 3) goes two of
+        its pixels further on each side. Corner and size are even."""
+        coarse = np.asarray(cv2.pyrUp(half), np.float32)[4:-4, 4:-4]
+        _set(self._finest[y : y + mask.shape[0], x : x + mask.shape[1]], layer, coarse, mask)
 
     def result(self) -> npt.NDArray[np.uint8]:
-        """(H, W, 3), 0 where no layer reaches. To be asked once."""
-        image = np.zeros_like(self._sum[BANDS])
-        for k in range(BANDS, 0, -1):
-            _collapse(self._sum[k], self._weight[k], image)
-            image = np.asarray(cv2.pyrUp(self._sum[k]), np.float32)
-        return np.asarray(_levels(self._sum[0], self._weight[0], image), np.uint8)
+        """(H, W, 3); nothing of use where no layer was wanted. To be asked once."""
+        image = np.zeros_like(self._sum[-1])
+        for total, weight in zip(self._sum[::-1], self._weight[::-1], strict=True):
+            _collapse(total, weight, image)
+            image = np.asarray(cv2.pyrUp(total), np.float32)
+        return np.asarray(_levels(self._finest, image), np.uint8)
+
+
+@numba.njit(cache=True, nogil=True)
+def _set(band: Layer, layer: Layer, coarse: Layer, mask: Mask) -> None:
+    """band = layer − coarse where the mask is set."""
+    for y in range(mask.shape[0]):
+        for x in range(mask.shape[1]):
+            if mask[y, x]:
+                for c in range(3):
+                    band[y, x, c] = layer[y, x, c] - coarse[y, x, c]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -60,13 +86,12 @@ def _collapse(total: Layer, weight: Layer, coarse: Layer) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _levels(total: Layer, weight: Layer, coarse: Layer) -> npt.NDArray[np.uint8]:
-    """The same of the finest band, rounded to grey levels."""
-    levels = np.empty(total.shape, np.uint8)
-    for y in range(weight.shape[0]):
-        for x in range(weight.shape[1]):
-            share = np.float32(1.0) / max(weight[y, x], np.float32(1e-4))
+def _levels(finest: Layer, coarse: Layer) -> npt.NDArray[np.uint8]:
+    """Their sum, rounded to grey levels."""
+    levels = np.empty(finest.shape, np.uint8)
+    for y in range(finest.shape[0]):
+        for x in range(finest.shape[1]):
             for c in range(3):
-                level = np.rint(total[y, x, c] * share + coarse[y, x, c])
+                level = np.rint(finest[y, x, c] + coarse[y, x, c])
                 levels[y, x, c] = np.uint8(min(max(level, np.float32(0.0)), np.float32(255.0)))
     return levels

@@ -3,9 +3,10 @@
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import cpu_count
 from threading import Lock
+from typing import NamedTuple
 
 import cv2
 import numba
@@ -16,9 +17,11 @@ from tasks.stitching.blending import ALIGN, REACH, MultiBand
 from tasks.stitching.canvas import Canvas
 from tasks.stitching.gain import Light, gain_table, relit
 from tasks.stitching.seams import Labels, Partition, label_window, partition, photo_map
-from tasks.stitching.view import View, shrunk
+from tasks.stitching.view import Array, View, shrunk
 
 Pixels = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
+Box = tuple[int, int, int, int]  # left, right, top and bottom; right and bottom excluded
 
 TILE_PX = 1024
 CACHE_BYTES = 400_000_000  # of decoded photos kept for the next tile
@@ -33,13 +36,24 @@ class Tile:
     source: npt.NDArray[np.uint16]  # (h, w) 1 + index of the photo; 0: none
 
 
+class Sizes(NamedTuple):
+    """A photo's pixels, and at half its size."""
+
+    full: Pixels
+    half: Pixels
+
+    @property
+    def nbytes(self) -> int:
+        return self.full.nbytes + self.half.nbytes
+
+
 class PhotoCache:
     """Photos as RGB; the least lately used go first. Threads may share it: one reads, the others wait."""
 
-    def __init__(self, read: Callable[[int], Pixels]) -> None:
-        self._read, self._kept, self._lock = read, OrderedDict[int, Future[Pixels]](), Lock()
+    def __init__(self, read: Callable[[int], Sizes]) -> None:
+        self._read, self._kept, self._lock = read, OrderedDict[int, Future[Sizes]](), Lock()
 
-    def __call__(self, index: int) -> Pixels:
+    def __call__(self, index: int) -> Sizes:
         with self._lock:
             first = index not in self._kept
             photo = self._kept.setdefault(index, Future())
@@ -61,6 +75,22 @@ class PhotoCache:
                 del there[oldest], self._kept[oldest]
 
 
+@dataclass(frozen=True)
+class Source:
+    """A photo as it is used, and what brings it to the light of all."""
+
+    view: View
+    half: View
+    table: Floats  # (256, 3), as gain_table gives it for each colour
+    falloff: Array  # (TERMS,)
+
+    def layer(self, pixels: Pixels, canvas: Canvas, view: View, x: int, y: int, w: int, h: int) -> Floats:
+        """(h, w, 3) sRGB levels of a window of the canvas. pixels: the photo's, as large as in `view`."""
+        at = photo_map(view, canvas, x, y, w, h)
+        warped = cv2.remap(pixels, at, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+        return relit(np.asarray(warped, np.uint8), at, view, self.table, self.falloff)
+
+
 def composite(
     canvas: Canvas,
     views: Sequence[View],
@@ -74,26 +104,27 @@ def composite(
     the photos' darkness, for the seams."""
     parted = partition(views, worth, canvas, dark)
     shrink = [max(1, int(canvas.gsd / v.units_per_px + 0.25)) for v in views]
-    used = [shrunk(v, s) for v, s in zip(views, shrink, strict=True)]
-    tables = [np.stack([gain_table(float(g)) for g in gains], axis=1) for gains in light.gains]
-
-    def read_used(index: int) -> Pixels:
-        pixels, camera = read(index), used[index].camera
-        if shrink[index] == 1:
-            return pixels
-        return np.asarray(
-            cv2.resize(pixels, (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA)
+    sources = [
+        Source(
+            shrunk(view, s),
+            shrunk(view, 2 * s),
+            np.stack([gain_table(float(g)) for g in gains], axis=1),
+            falloff,
         )
+        for view, s, gains, falloff in zip(views, shrink, light.gains, light.falloff, strict=True)
+    ]
 
-    cache = PhotoCache(read_used)
+    def read_sizes(index: int) -> Sizes:
+        full = _reduced(read(index), sources[index].view)
+        return Sizes(full, _reduced(full, sources[index].half))
+
+    cache = PhotoCache(read_sizes)
     corners = _corners(canvas)
     workers = min(2, cpu_count() or 1)
     with ThreadPoolExecutor(max_workers=workers) as threads:
         for start in range(0, len(corners), workers):
             batch = corners[start : start + workers]
-            yield from threads.map(
-                lambda corner: _tile(corner, canvas, used, worth, parted, tables, light, cache), batch
-            )
+            yield from threads.map(lambda corner: _tile(corner, canvas, sources, worth, parted, cache), batch)
             on_progress(min(1.0, (start + workers) / len(corners)))
 
 
@@ -103,32 +134,42 @@ def _corners(canvas: Canvas) -> list[tuple[int, int]]:
     return [(x, y) for k, y in enumerate(rows) for x in (columns if k % 2 == 0 else columns[::-1])]
 
 
+def _reduced(pixels: Pixels, view: View) -> Pixels:
+    """The photo as large as the view has it."""
+    size = view.camera.width_px, view.camera.height_px
+    if size == pixels.shape[1::-1]:
+        return pixels
+    return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
 def _tile(
     corner: tuple[int, int],
     canvas: Canvas,
-    views: Sequence[View],
+    sources: Sequence[Source],
     worth: Sequence[float],
     parted: Partition,
-    tables: Sequence[npt.NDArray[np.float32]],
-    light: Light,
-    read: Callable[[int], Pixels],
+    read: Callable[[int], Sizes],
 ) -> Tile:
     x, y = corner
     width, height = min(TILE_PX, canvas.width_px - x), min(TILE_PX, canvas.height_px - y)
     # The window reaches beyond the tile by what blending sees, beyond the canvas too.
-    wx, wy = x - REACH, y - REACH
-    ww, wh = TILE_PX + 2 * REACH, TILE_PX + 2 * REACH
-    label = label_window(views, worth, canvas, parted, wx, wy, ww, wh)
-    blend = MultiBand(ww, wh)
-    for i, (left, right, top, bottom) in _boxes(label):
-        x0, x1 = _reached(left, right, ww)
-        y0, y1 = _reached(top, bottom, wh)
-        at = photo_map(views[i], canvas, wx + x0, wy + y0, x1 - x0, y1 - y0)
-        warped = cv2.remap(read(i), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        layer = relit(np.asarray(warped, np.uint8), at, views[i], tables[i], light.falloff[i])
-        blend.add(layer, (label[y0:y1, x0:x1] == i).astype(np.float32), x0, y0)
+    wx, wy, side = x - REACH, y - REACH, TILE_PX + 2 * REACH
+    label = label_window([s.view for s in sources], worth, canvas, parted, wx, wy, side, side)
     inner = (slice(REACH, REACH + height), slice(REACH, REACH + width))
     own = label[inner]
+    blend, alone = MultiBand(side, side), dict(_boxes(own))
+    coarse = replace(canvas, gsd=2.0 * canvas.gsd)  # whose pixels are every second of the canvas's
+    for i, box in _boxes(label):
+        source, pixels = sources[i], read(i)
+        x0, x1, y0, y1 = _reached(box, side)
+        left, top = (wx + x0) // 2, (wy + y0) // 2
+        half = source.layer(pixels.half, coarse, source.half, left, top, (x1 - x0) // 2, (y1 - y0) // 2)
+        blend.add(half, (label[y0:y1, x0:x1] == i).astype(np.float32), x0, y0)
+        if i in alone:
+            a0, a1, b0, b1 = (n + REACH for n in _aligned(alone[i]))
+            layer = source.layer(pixels.full, canvas, source.view, wx + a0, wy + b0, a1 - a0, b1 - b0)
+            around = half[(b0 - y0) // 2 - 2 : (b1 - y0) // 2 + 2, (a0 - x0) // 2 - 2 : (a1 - x0) // 2 + 2]
+            blend.add_finest(layer, around, label[b0:b1, a0:a1] == i, a0, b0)
     covered = own >= 0
     rgb = np.ascontiguousarray(blend.result()[inner])
     if not covered.all():
@@ -136,8 +177,8 @@ def _tile(
     return Tile(x, y, rgb, np.where(covered, 255, 0).astype(np.uint8), (own + 1).astype(np.uint16))
 
 
-def _boxes(label: Labels) -> Iterator[tuple[int, tuple[int, int, int, int]]]:
-    """Every photo in sight, and the left, right, top and bottom of its land; right and bottom excluded."""
+def _boxes(label: Labels) -> Iterator[tuple[int, Box]]:
+    """Every photo in sight, and the box of its land."""
     for i, (left, right, top, bottom) in enumerate(_extents(label, int(label.max()) + 1).tolist()):
         if right > 0:
             yield i, (left, right, top, bottom)
@@ -157,6 +198,17 @@ def _extents(label: Labels, photos: int) -> Labels:
     return boxes
 
 
-def _reached(low: int, high: int, size: int) -> tuple[int, int]:
-    """Grown by the reach of blending, aligned."""
-    return max(0, (low - REACH) // ALIGN * ALIGN), min(size, -(-(high + REACH) // ALIGN) * ALIGN)
+def _reached(box: Box, side: int) -> Box:
+    """Grown by the reach of blending, aligned, inside the window."""
+    left, right, top, bottom = box
+    low = [max(0, (n - REACH) // ALIGN * ALIGN) for n in (left, top)]
+    high = [min(side, -(-(n + REACH) // ALIGN) * ALIGN) for n in (right, bottom)]
+    return low[0], high[0], low[1], high[1]
+
+
+def _aligned(box: Box) -> Box:
+    """Grown to multiples of ALIGN: where a projection is exact is the same in every tile."""
+    left, right, top, bottom = box
+    low = [n // ALIGN * ALIGN for n in (left, top)]
+    high = [-(-n // ALIGN) * ALIGN for n in (right, bottom)]
+    return low[0], high[0], low[1], high[1]

@@ -29,7 +29,7 @@ from tasks.photos.task import features, ingest
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.task import stitch
 from tasks.surfaces.task import measure_relief
-from tests.benchmarks import beach_rows, mosaic_size_rows
+from tests.benchmarks import beach_rows, feature_rows, mosaic_size_rows
 from tests.benchmarks.mosaic_truth import errors, heights_of, on_crack, seam_steps_px
 from tests.benchmarks.stitchers import NEEDS, PEERS, run_peer
 from tests.benchmarks.wall_photos import CASES, Case, WallPhotos, wall_photos
@@ -264,6 +264,7 @@ def main() -> None:
         "--large", type=int, nargs=2, metavar=("COLUMNS", "ROWS"), help="memory at 12 MP a photo"
     )
     asked.add_argument("--gsd", type=float, help="of the mosaic of --large, mm a pixel")
+    asked.add_argument("--features", action="store_true", help="beside OpenCV's SIFT")
     asked.add_argument("--beach", action="store_true", help="the real photos, at full size")
     asked.add_argument("--megapixels", type=float, default=2.0)
     given = asked.parse_args()
@@ -277,6 +278,10 @@ def main() -> None:
             _tell(line)
     if given.large:
         for line in mosaic_size_rows.rows(*given.large, given.cache, given.gsd):
+            table.append(line)
+            _tell(line)
+    if given.features:
+        for line in feature_rows.rows(given.cache):
             table.append(line)
             _tell(line)
     if given.beach:

@@ -1,5 +1,6 @@
 """Gains and multi-band blending."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -8,12 +9,37 @@ from tasks.stitching.blending import MultiBand
 from tasks.stitching.gain import Light, gain_table, relit, solve_light, srgb_to_linear
 from tasks.stitching.view import FACING, View
 
+RIM = 8  # of a window, where the finest band is not asked for
+
+
+def add(blend: MultiBand, layer: np.ndarray, mask: np.ndarray) -> None:
+    half = np.asarray(cv2.pyrDown(layer), np.float32)
+    blend.add(half, mask, 0, 0)
+    inner = (slice(RIM, -RIM), slice(RIM, -RIM))
+    around = half[RIM // 2 - 2 : 2 - RIM // 2, RIM // 2 - 2 : 2 - RIM // 2]
+    blend.add_finest(layer[inner], around, mask[inner] > 0, RIM, RIM)
+
+
+def shown(blend: MultiBand) -> np.ndarray:
+    return blend.result()[RIM:-RIM, RIM:-RIM].astype(float)
+
 
 def test_one_layer_is_left_as_it_is() -> None:
     layer = np.random.default_rng(0).uniform(0, 255, (256, 320, 3)).astype(np.float32)
     blend = MultiBand(320, 256)
-    blend.add(layer, np.ones((256, 320), np.float32), 0, 0)
-    assert np.abs(blend.result().astype(float) - layer).max() <= 0.51
+    add(blend, layer, np.ones((256, 320), np.float32))
+    assert np.abs(shown(blend) - layer[RIM:-RIM, RIM:-RIM]).max() <= 0.51
+
+
+def test_what_a_layer_has_at_half_its_size_need_not_be_what_it_has_at_full_size() -> None:
+    """Where it is alone it is shown as it is."""
+    rng = np.random.default_rng(2)
+    layer = rng.uniform(50, 200, (256, 320, 3)).astype(np.float32)
+    half = np.asarray(cv2.pyrDown(layer), np.float32) + rng.uniform(-9, 9, (128, 160, 3)).astype(np.float32)
+    blend, everywhere = MultiBand(320, 256), np.ones((256, 320), np.float32)
+    blend.add(half, everywhere, 0, 0)
+    blend.add_finest(layer[4:-4, 4:-4], half, everywhere[4:-4, 4:-4] > 0, 4, 4)
+    assert np.abs(shown(blend) - layer[RIM:-RIM, RIM:-RIM]).max() <= 0.51
 
 
 def test_layers_that_agree_show_no_seam() -> None:
@@ -21,9 +47,9 @@ def test_layers_that_agree_show_no_seam() -> None:
     left = np.zeros((256, 320), np.float32)
     left[:, :150] = 1
     blend = MultiBand(320, 256)
-    blend.add(layer, left, 0, 0)
-    blend.add(layer, 1 - left, 0, 0)
-    assert np.abs(blend.result().astype(float) - layer).max() <= 0.51
+    add(blend, layer, left)
+    add(blend, layer, 1 - left)
+    assert np.abs(shown(blend) - layer[RIM:-RIM, RIM:-RIM]).max() <= 0.51
 
 
 def test_a_step_of_light_becomes_a_slope() -> None:
@@ -31,9 +57,9 @@ def test_a_step_of_light_becomes_a_slope() -> None:
     mask = np.zeros((256, 640), np.float32)
     mask[:, :320] = 1
     blend = MultiBand(640, 256)
-    blend.add(np.full((256, 640, 3), 110, np.float32), mask, 0, 0)
-    blend.add(np.full((256, 640, 3), 130, np.float32), 1 - mask, 0, 0)
-    row = blend.result()[128, :, 0].astype(int)
+    add(blend, np.full((256, 640, 3), 110, np.float32), mask)
+    add(blend, np.full((256, 640, 3), 130, np.float32), 1 - mask)
+    row = shown(blend)[128, :, 0]
     assert np.abs(np.diff(row)).max() <= 1
     assert (row[0], row[-1]) == (110, 130)
 

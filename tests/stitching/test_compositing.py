@@ -9,23 +9,28 @@ import pytest
 
 from schemas.problem import BadInput
 from tasks.stitching import compositing
-from tasks.stitching.compositing import PhotoCache, Pixels, _boxes
+from tasks.stitching.compositing import PhotoCache, Sizes, _boxes
+
+
+def sizes(level: int) -> Sizes:
+    """15 bytes."""
+    return Sizes(np.full((2, 2, 3), level, np.uint8), np.full((1, 1, 3), level, np.uint8))
 
 
 def test_a_photo_that_threads_ask_for_at_once_is_read_once() -> None:
     reads: list[int] = []
     together = threading.Barrier(4)
 
-    def read(index: int) -> Pixels:
+    def read(index: int) -> Sizes:
         reads.append(index)
         time.sleep(0.05)
-        return np.full((2, 2, 3), index, np.uint8)
+        return sizes(index)
 
     cache = PhotoCache(read)
 
     def ask(index: int) -> int:
         together.wait()
-        return int(cache(index)[0, 0, 0])
+        return int(cache(index).full[0, 0, 0])
 
     with ThreadPoolExecutor(4) as threads:
         assert list(threads.map(ask, (7, 7, 8, 7))) == [7, 7, 8, 7]
@@ -33,12 +38,12 @@ def test_a_photo_that_threads_ask_for_at_once_is_read_once() -> None:
 
 
 def test_the_least_lately_used_photo_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compositing, "CACHE_BYTES", 24)
+    monkeypatch.setattr(compositing, "CACHE_BYTES", 30)  # two photos
     reads: list[int] = []
 
-    def read(index: int) -> Pixels:
+    def read(index: int) -> Sizes:
         reads.append(index)
-        return np.zeros((2, 2, 3), np.uint8)  # 12 bytes
+        return sizes(index)
 
     cache = PhotoCache(read)
     for index in (0, 1, 0, 2, 0, 1):
@@ -47,7 +52,7 @@ def test_the_least_lately_used_photo_goes_first(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_all_who_wait_for_a_photo_hear_that_it_cannot_be_read() -> None:
-    def read(index: int) -> Pixels:
+    def read(index: int) -> Sizes:
         time.sleep(0.05)
         raise BadInput("a.jpg", "cannot be read", "Copy it again")
 
