@@ -12,6 +12,7 @@ end after a second of flight, so that a killed process loses no more than that.
 import math
 import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -64,8 +65,9 @@ class FlightArchive:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._stream.close()
+        with suppress(*((OSError,) if error is not None else ())):  # what went wrong first is what is told
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._stream.close()
 
     def frame(self, time_ns: int, raw: bytes) -> None:
         self._add(MAVLINK, time_ns, raw, "mavlink")

@@ -43,12 +43,12 @@ AIRBORNE_M = 0.5
 
 
 class FlightLost(Exception):
-    """The flight is no longer followed: the link broke, or Ctrl-C. recording: what was received so far; left:
-    what of its settings stays changed on the vehicle, in words."""
+    """The flight is no longer followed. recording: what was received so far; left: what of its settings stays
+    changed on the vehicle, in words; why: None where the link broke."""
 
-    def __init__(self, recording: Recording, left: str | None, interrupted: bool = False) -> None:
-        super().__init__(recording, left, interrupted)
-        self.recording, self.left, self.interrupted = recording, left, interrupted
+    def __init__(self, recording: Recording, left: str | None, why: str | None = None) -> None:
+        super().__init__(recording, left, why)
+        self.recording, self.left, self.why = recording, left, why
 
 
 class Flight:
@@ -149,7 +149,7 @@ class Flight:
         """Arm, fly, follow to disarming; everything from the arming on goes to the recorder.
 
         Raises BadInput where the flight does not begin (the mission is cleared then), FlightLost where the
-        link breaks in the air, or Ctrl-C ends the following: the vehicle flies on by itself.
+        link breaks in the air, the disk is full, or Ctrl-C: the vehicle flies on by itself.
         """
         try:
             self._arm(recorder)
@@ -158,19 +158,21 @@ class Flight:
         except LinkLost:
             raise self._lost() from None
         except BaseException:
-            self._stand_down()
+            self.stand_down()
             raise
         try:
             self._follow(on_progress)
         except LinkLost:
             raise self._lost() from None
         except KeyboardInterrupt:
-            raise self._lost(interrupted=True) from None
+            raise self._lost("following the flight was interrupted") from None
+        except OSError as problem:
+            raise self._lost(f"its flight cannot be archived any more ({problem.strerror})") from None
         landed = not self.reader.armed and bool(self.reader.recording.armed_s)
         recording = self.reader.close()
         self._recorder = None
         if max((fix.height_m for fix in recording.fixes), default=0.0) < AIRBORNE_M:
-            self._stand_down()
+            self.stand_down()
             raise self._problem("the vehicle armed but did not take off")
         if landed:
             self._give_back()
@@ -234,7 +236,7 @@ class Flight:
             if not self.reader.recording.armed_s and time.monotonic() - began > START_S:
                 return
 
-    def _stand_down(self) -> None:
+    def stand_down(self) -> None:
         """On the ground, after a failure: motors off, its own way home, no mission left. In the air the first
         is not obeyed, and the plan's way home is needed."""
         try:
@@ -245,9 +247,9 @@ class Flight:
             return
         abandon_mission(self.link)
 
-    def _lost(self, interrupted: bool = False) -> FlightLost:
+    def _lost(self, why: str | None = None) -> FlightLost:
         left = self._way_home.left if self._way_home else None
-        return FlightLost(self.reader.close(), left, interrupted)
+        return FlightLost(self.reader.close(), left, why)
 
     def _give_back(self) -> None:
         if self._way_home is not None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from shutil import disk_usage
 from typing import TYPE_CHECKING, Any
 
 from artifacts import store
@@ -10,7 +11,7 @@ from artifacts.page import Page
 from schemas.file import File
 from schemas.flight_log import FlightLog, joined
 from schemas.flight_plan import FlightPlan
-from schemas.mission import mission_items
+from schemas.mission import MissionItem, mission_items
 from schemas.problem import BadInput
 from tasks.stage import note, progress, stage
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from tasks.flight.recording import Recording
 
 ARCHIVE = "flight.mcap"
+LEAST_FREE_BYTES = 200_000_000  # an hour of telemetry, twice: as it is written and as it is kept
+ROOM = "Free some disk where results are kept, then fly the plan again; the vehicle is as it was"
 
 
 class FlightCutShort(BadInput):
@@ -69,22 +72,35 @@ def fly(plan: FlightPlan, mission: str, connection: str, timeout_s: float) -> Fl
 
     mission: id of this flight; another id flies again. timeout_s: a vehicle silent for this long is lost.
     """
+    items = mission_items(plan)
+    with store.current().scratch() as folder:
+        free = disk_usage(folder).free
+        if free < LEAST_FREE_BYTES:
+            what = f"there are {free / 1e6:.0f} MB of disk left to archive its flight, and it may need"
+            raise BadInput(connection, f"{what} {LEAST_FREE_BYTES / 1e6:.0f} MB", ROOM)
+        return _flown(plan, items, connection, timeout_s, folder)
+
+
+def _flown(
+    plan: FlightPlan, items: tuple[MissionItem, ...], connection: str, timeout_s: float, folder: Path
+) -> FlightLog:
     from tasks.flight.fly import Flight, FlightLost
     from tasks.flight.link import Link
     from tasks.flight.telling import Teller
 
-    items = mission_items(plan)
-    with store.current().scratch() as folder, Link(connection, timeout_s) as link:
+    with Link(connection, timeout_s) as link:
         flight = Flight(link, plan, items)
         vehicle = flight.prepare()
         for text in flight.way_home:
             note(text)
         path = folder / ARCHIVE
         try:
-            with (
-                FlightArchive(path, _about(vehicle, "mavlink", plan)) as recorder,
-                Teller(progress) as tell,
-            ):
+            archive = FlightArchive(path, _about(vehicle, "mavlink", plan))
+        except OSError as problem:
+            flight.stand_down()
+            raise BadInput(connection, f"its flight cannot be archived ({problem.strerror})", ROOM) from None
+        try:
+            with archive as recorder, Teller(progress) as tell:
                 recording = flight.execute(recorder, tell)
         except FlightLost as lost:
             raise _cut_short(connection, timeout_s, lost, store.current().put(path)) from None
@@ -182,8 +198,8 @@ def _about(vehicle: str, kind: str, plan: FlightPlan) -> dict[str, str]:
 def _cut_short(connection: str, timeout_s: float, lost: "FlightLost", archive: File) -> FlightCutShort:
     fixes = lost.recording.fixes
     flown_s = fixes[-1].time_s - fixes[0].time_s if fixes else 0.0
-    if lost.interrupted:
-        what = f"following the flight was interrupted, {flown_s:.0f} s after arming"
+    if lost.why is not None:
+        what = f"{lost.why}, {flown_s:.0f} s after arming"
         then = "The vehicle flies its mission on by itself: to stop it, take over by radio or ground station"
     else:
         what = f"the vehicle was not heard for {timeout_s:g} s, {flown_s:.0f} s after arming"

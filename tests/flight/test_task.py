@@ -20,6 +20,7 @@ from schemas.mission import mission_items
 from schemas.problem import BadInput
 from tasks.flight.fly import AUTO, Flight
 from tasks.flight.link import Link, LinkLost
+from tasks.flight.parameters import read_parameters
 from tasks.flight.recording import archive
 from tasks.flight.task import FlightCutShort, convert, flight_pages, fly, import_log
 from tasks.flight.upload import clear_mission, read_back
@@ -147,19 +148,27 @@ def test_a_link_lost_in_flight_keeps_what_was_archived() -> None:
     assert part.missed
 
 
-def test_an_interrupted_flight_keeps_what_was_archived_and_says_that_the_vehicle_flies_on(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("cause", "told"),
+    [
+        (KeyboardInterrupt(), "interrupted"),
+        (OSError(28, "No space left"), r"archived any more \(No space left\)"),
+    ],
+    ids=["interrupted", "disk full"],
+)
+def test_a_flight_not_followed_keeps_what_was_archived_and_says_that_the_vehicle_flies_on(
+    cause: BaseException, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     archived = itertools.count()
 
     def interrupted(*args: Any) -> None:
         archive(*args)
         if next(archived) == 900:
-            raise KeyboardInterrupt
+            raise cause
 
     monkeypatch.setattr("tasks.flight.fly.archive", interrupted)
     flies_on = (
-        r"interrupted, \d+ s after arming\. The vehicle flies its mission on.*take over.*"
+        rf"{told}, \d+ s after arming\. The vehicle flies its mission on.*take over.*"
         r"Its RTL_ALT is this flight's: set it back to 1500 once it has landed"
     )
     plan = PLAN.model_copy(update={"return_height_m": 8.5})
@@ -169,6 +178,32 @@ def test_an_interrupted_flight_keeps_what_was_archived_and_says_that_the_vehicle
     assert part.shots
     assert part.missed
     assert str(pickle.loads(pickle.dumps(problem.value))) == str(problem.value)
+
+
+def test_a_disk_that_is_nearly_full_is_told_before_the_vehicle_is_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tasks.flight.task.LEAST_FREE_BYTES", 10**18)
+    with pytest.raises(BadInput, match=r"MB of disk left.*Free some disk") as problem:
+        fly.bare(PLAN, "1", "udp:127.0.0.1:1", 1.0)
+    assert problem.value.item == "udp:127.0.0.1:1"
+
+
+def test_an_archive_that_cannot_be_opened_leaves_the_vehicle_as_it_was(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left")
+
+    monkeypatch.setattr("tasks.flight.task.FlightArchive", full)
+    plan = PLAN.model_copy(update={"return_height_m": 8.5})
+    with start_vehicle(plan, 1) as url:
+        with pytest.raises(BadInput, match=r"cannot be archived \(No space left\)"):
+            fly.bare(plan, "1", url, 5.0)
+        with Link(url, 5.0) as link:
+            link.find_vehicle()
+            assert read_back(link) == ()
+            assert read_parameters(link, [("RTL_ALT",)])["RTL_ALT"].param_value == 1500.0
 
 
 def test_what_the_vehicle_warned_of_stands_beside_the_photos_that_lack() -> None:

@@ -102,7 +102,7 @@ def test_a_vehicle_that_does_not_disarm_may_fly_and_keeps_the_plan_s_height(
         denied = mavlink.MAV_RESULT_FAILED
         if not disarms:
             monkeypatch.setattr(link, "command", lambda command, *params, **how: denied)
-        flight._stand_down()
+        flight.stand_down()
         assert height_of(link) == ("RTL_ALT", height)
 
 
