@@ -10,7 +10,7 @@ import numpy.typing as npt
 LAYERS = 3  # sizes to each doubling
 SIGMA = 1.6  # blur of an octave's first layer, in its pixels
 OWN_SIGMA = 0.5  # of a photo's pixel
-LEAST_SIDE_PX = 12  # of an octave
+LEAST_SIDE_PX = 12  # of an octave but the first
 BORDER_PX = 5
 EDGE = 10.0  # ratio of curvatures from where on a point slides along an edge
 STEPS = 5  # of refinement
@@ -42,8 +42,8 @@ def octaves(grey: Grey, enlarged: float) -> list[Octave]:
     """Each half as large as the one before; grey: (H, W) levels of a photo enlarged so many times."""
     own = OWN_SIGMA * max(1.0, enlarged)
     first = cv2.GaussianBlur(grey, (0, 0), (SIGMA**2 - own**2) ** 0.5) if own < SIGMA else grey
-    found = []
-    while min(first.shape) >= LEAST_SIDE_PX:
+    found: list[Octave] = []
+    while not found or min(first.shape) >= LEAST_SIDE_PX:
         layers: Octave = np.empty((LAYERS + 3, *first.shape), np.float32)
         layers[0] = first
         for k in range(1, LAYERS + 3):

@@ -65,6 +65,7 @@ def test_what_no_neighbour_surpasses_is_all_that_is_looked_at() -> None:
     assert {tuple(map(int, row)) for row in _outstanding(layers, np.float32(0.5))} == expected
 
 
-def test_a_picture_smaller_than_an_octave_has_none() -> None:
-    assert octaves(np.zeros((8, 300), np.float32), 1.0) == []
-    assert len(extrema([], CONTRAST).x) == 0
+@pytest.mark.parametrize("shape", [(1, 1), (8, 300), (300, 2)])
+def test_a_picture_too_small_for_any_holds_no_points(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(0)
+    assert len(found(rng.uniform(0, 255, shape)).x) == 0
