@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from skimage.morphology import skeletonize
 
-from training.cracks import DOUBTFUL, FAINT, GAP_PX, VISIBLE, cracks_on, faint, seen, told
+from training.cracks import DOUBTFUL, FAINT, VISIBLE, cracks_on, faint, seen, told
 
 SIDE_PX = 224
 ON_CRACK = 0.3  # share of the crops of a photo with a crack that are centred on it
@@ -16,7 +16,6 @@ DRAWN = 0.1  # share of the crops of photos on which further cracks are drawn: r
 LENT = 0.25  # share of all crops on which the cracks of another photo are laid
 FADED = 0.25  # share of all crops whose cracks are made fainter
 DAPPLED = 0.15  # share of all crops on which leaves and branches throw their shadows
-BARRED = 0.15  # share of all crops on which rails, poles and cables do
 LENT_SCALES = (0.5, 6.0)  # seen from near they are wide, and the surface still sharp
 AROUND_PX = 41  # the surface beside a crack is told from this far around it
 FOLDS = 5
@@ -139,13 +138,11 @@ def _texture(rgb: Floats) -> float:
 
 
 def _cracked(rgb: Floats, truth: Floats, rng: Rng) -> tuple[Floats, Floats]:
-    """Further cracks across the crop, each lot as dark as one crack: dark where one is a gap."""
+    """Further cracks across the crop, each lot as dark as one crack."""
     texture = _texture(rgb)
-    cracks = cracks_on(rng, SIDE_PX, 1.0, texture)
-    share = seen(cracks, SIDE_PX, SIDE_PX, 1.0)
-    gap = max(float(np.median(crack.left_m + crack.right_m)) for crack in cracks) >= GAP_PX
-    kept = np.exp(rng.uniform(np.log(0.12), np.log(0.4 if gap else 0.88)))
-    if not gap and rng.random() < FAINT:
+    share = seen(cracks_on(rng, SIDE_PX, 1.0, texture), SIDE_PX, SIDE_PX, 1.0)
+    kept = np.exp(rng.uniform(np.log(0.12), np.log(0.88)))
+    if rng.random() < FAINT:
         kept = faint(rng, texture)
     cracked = rgb * (1.0 - share * np.float32(1.0 - kept))[..., None]
     drawn = told(cracked, 255 * (share >= VISIBLE).astype(np.uint8))
@@ -178,7 +175,7 @@ def _softened(rgb: Pixels, at: tuple[float, float], scale: float) -> Pixels:
 
 
 def _dappled(rgb: Floats, rng: Rng) -> Floats:
-    """Under ragged, drawn-out shadows: darker and bluer, for the sky shines there."""
+    """Under ragged, drawn-out shadows: darker and bluer, for the sky shines there, sharp as in the sun."""
     wide = 2 * SIDE_PX  # to turn and stretch
     size_px = float(np.exp(rng.uniform(np.log(8.0), np.log(50.0))))
     leaves = np.zeros((wide, wide), np.float32)
@@ -190,28 +187,9 @@ def _dappled(rgb: Floats, rng: Rng) -> Floats:
     turn[:, 2] = SIDE_PX / 2 - turn[:, :2] @ np.full(2, wide / 2)
     turned = cv2.warpAffine(leaves, turn, (SIDE_PX, SIDE_PX), borderMode=cv2.BORDER_REFLECT_101)
     sharp = (turned > np.quantile(turned, rng.uniform(0.7, 0.97))).astype(np.float32)
-    return _shaded(rgb, sharp, rng)
-
-
-def _barred(rgb: Floats, rng: Rng) -> Floats:
-    """Under the narrow shadows of some rails or cables, side by side, straight or bent, with smooth edges."""
-    bend_px = float(np.exp(rng.uniform(np.log(80.0), np.log(8000.0))))
-    middle, angle = rng.uniform(0.0, SIDE_PX, 2), rng.uniform(0.0, 2.0 * np.pi)
-    centre_x, centre_y = middle + bend_px * np.array([np.cos(angle), np.sin(angle)])
-    y, x = np.mgrid[:SIDE_PX, :SIDE_PX].astype(np.float32)
-    across = np.hypot(x - centre_x, y - centre_y) - bend_px
-    sharp = np.zeros((SIDE_PX, SIDE_PX), np.float32)
-    for off_px in (0.0, *rng.normal(0.0, 0.2 * SIDE_PX, int(rng.integers(0, 3)))):
-        half_px = 0.5 * float(np.exp(rng.uniform(np.log(2.0), np.log(60.0))))
-        sharp[np.abs(across - off_px) < half_px] = 1.0
-    return _shaded(rgb, sharp, rng)
-
-
-def _shaded(rgb: Floats, shadow: Floats, rng: Rng) -> Floats:
-    """The crop where a sharp shadow of 0 or 1 falls through the air between."""
-    soft = cv2.GaussianBlur(shadow, (0, 0), float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))))
+    shadow = cv2.GaussianBlur(sharp, (0, 0), float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))))
     kept = float(rng.uniform(0.25, 0.7)) * np.array([0.95, 1.0, rng.uniform(1.0, 1.3)], np.float32)
-    return np.asarray(rgb * (1.0 - soft[..., None] * (1.0 - kept)), np.float32)
+    return np.asarray(rgb * (1.0 - shadow[..., None] * (1.0 - kept)), np.float32)
 
 
 def _relit(rgb: Floats, rng: Rng) -> Floats:
@@ -225,8 +203,6 @@ def _relit(rgb: Floats, rng: Rng) -> Floats:
         rgb = rgb * (1.0 - shade).astype(np.float32)[..., None]
     if rng.random() < DAPPLED:
         rgb = _dappled(rgb, rng)
-    if rng.random() < BARRED:
-        rgb = _barred(rgb, rng)
     gain = np.exp(rng.normal(-0.1, 0.45) + rng.normal(0.0, 0.06, 3)).astype(np.float32)
     rgb = np.clip(rgb * gain, np.float32(1e-3), np.float32(1.0)) ** np.float32(np.exp(rng.normal(0.0, 0.25)))
     grey = rgb @ np.full((3, 1), 1 / 3, np.float32)

@@ -13,14 +13,13 @@ import numpy.typing as npt
 from schemas.camera import Camera
 from schemas.settings import StitchSettings
 from tasks.photos.scale_space import Points
-from tasks.photos.sift import CONTRAST, Keypoints, _root, _spread, detect_features
+from tasks.photos.sift import CONTRAST, DETECTION_PX, Keypoints, _root, _spread, detect_features
 from tasks.stitching.matching import match
 from tests.benchmarks.table import Row, row
 from tests.benchmarks.wall_photos import CASES, GSD_M, WallPhotos, wall_photos
 
 GRID, MEGAPIXELS = (3, 2), 8.0
 RIGHT_PX = 3.0  # a match that lies off by more is a wrong one
-OPENCV_PX = 1.0e6  # doubled by OpenCV along each side: as many as ours looks at
 
 Grey = npt.NDArray[np.uint8]
 Detect = Callable[[Grey, Camera, int], Keypoints]
@@ -76,7 +75,7 @@ def _as_taken(xy: npt.NDArray[np.float32], camera: Camera) -> npt.NDArray[np.flo
 
 def opencv_features(grey: Grey, camera: Camera, most: int) -> Keypoints:
     height, width = grey.shape
-    shrink = min(1.0, (OPENCV_PX / (width * height)) ** 0.5)
+    shrink = min(1.0, (DETECTION_PX / (width * height)) ** 0.5)
     size = round(width * shrink), round(height * shrink)
     small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
     sift = cv2.SIFT.create(contrastThreshold=CONTRAST, enable_precise_upscale=True)
