@@ -65,9 +65,8 @@ class FlightArchive:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(*((OSError,) if error is not None else ())):  # what went wrong first is what is told
+        with suppress(*((OSError,) if error is not None else ())), self._stream:  # the first error is told
             self._writer.finish()  # type: ignore[no-untyped-call]
-            self._stream.close()
 
     def frame(self, time_ns: int, raw: bytes) -> None:
         self._add(MAVLINK, time_ns, raw, "mavlink")

@@ -168,19 +168,17 @@ def _gather(grey: Floats, x: float, y: float, angle: float, cell_px: float, padd
             left, upper = one - right, (one - lower) * weight
             lower *= weight
             u, v = u + du, v + dv
-            above, below = padded[row], padded[row + 1]
-            share = upper * left
-            above[column, bin_] += share * (one - next_)
-            above[column, bin_ + 1] += share * next_
-            share = upper * right
-            above[column + 1, bin_] += share * (one - next_)
-            above[column + 1, bin_ + 1] += share * next_
-            share = lower * left
-            below[column, bin_] += share * (one - next_)
-            below[column, bin_ + 1] += share * next_
-            share = lower * right
-            below[column + 1, bin_] += share * (one - next_)
-            below[column + 1, bin_ + 1] += share * next_
+            _add(padded[row, column], bin_, next_, upper * left)
+            _add(padded[row, column + 1], bin_, next_, upper * right)
+            _add(padded[row + 1, column], bin_, next_, lower * left)
+            _add(padded[row + 1, column + 1], bin_, next_, lower * right)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _add(bins: Floats, first: int, to_next: np.float32, weight: np.float32) -> None:
+    """To a direction and the next one."""
+    bins[first] += weight * (np.float32(1.0) - to_next)
+    bins[first + 1] += weight * to_next
 
 
 @numba.njit(cache=True, nogil=True)

@@ -130,3 +130,17 @@ def test_another_mcap_file_is_refused(tmp_path: Path) -> None:
         writer.finish()
     with pytest.raises(BadInput, match=r"other\.mcap.*no flight that Hairline archived"):
         about(tmp_path / "other.mcap", "other.mcap")
+
+
+@pytest.mark.parametrize("inside", [None, OSError(28, "while flying")])
+def test_a_full_disk_tells_what_went_wrong_first(
+    inside: OSError | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: object) -> None:
+        raise OSError(28, "at the end")
+
+    with pytest.raises(OSError, match="at the end" if inside is None else "while flying"):  # noqa: SIM117
+        with FlightArchive(tmp_path / "a.mcap", {}) as archive:
+            monkeypatch.setattr(archive._writer, "finish", lambda: full(archive))
+            if inside is not None:
+                raise inside

@@ -51,6 +51,24 @@ def test_a_turned_and_brighter_picture_looks_the_same() -> None:
     assert np.median(np.abs(off)) < 1.0
 
 
+def test_descriptors_are_those_of_opencv() -> None:
+    """Whose directions go the other way round."""
+    grey = cv2.GaussianBlur(texture(301, 301), (0, 0), 2.0)
+    points = extrema(space(grey), 0.01)
+    index, angle, ours = described(space(grey), points, 300)
+    at = points.where(index)
+    keypoints = [
+        cv2.KeyPoint(x, y, 2 * sigma, np.degrees(turn) % 360, response, int(octave) + (round(layer) << 8))
+        for x, y, sigma, turn, response, octave, layer in zip(
+            at.x, at.y, at.sigma, angle, at.response, at.octave, at.layer, strict=True
+        )
+    ]
+    _, theirs = cv2.SIFT.create().compute(grey, keypoints)
+    theirs = theirs.reshape(-1, 16, 8)[:, :, [0, 7, 6, 5, 4, 3, 2, 1]].reshape(-1, 128)
+    alike = (ours * theirs).sum(axis=1) / np.linalg.norm(theirs, axis=1)
+    assert len(alike) > 100 and np.median(alike) > 0.99 and np.percentile(alike, 2) > 0.95
+
+
 def test_the_strongest_points_come_first_and_no_more_than_asked_for() -> None:
     grey = cv2.GaussianBlur(texture(301, 301), (0, 0), 2.0)
     points = extrema(space(grey), 0.002)

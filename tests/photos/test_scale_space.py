@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.photos.scale_space import Points, extrema, octaves
+from tasks.photos.scale_space import BORDER_PX, LAYERS, Points, _outstanding, extrema, octaves
 
 CONTRAST = 0.002
 
@@ -50,8 +50,6 @@ def test_edges_and_the_rim_hold_no_points() -> None:
 
 def test_what_no_neighbour_surpasses_is_all_that_is_looked_at() -> None:
     """Beside a plain search of every pixel."""
-    from tasks.photos.scale_space import BORDER_PX, LAYERS, _outstanding
-
     rng = np.random.default_rng(0)
     layers = rng.normal(size=(LAYERS + 3, 40, 50)).astype(np.float32)
     away = layers[1:] - layers[:-1]
