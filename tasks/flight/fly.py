@@ -238,7 +238,8 @@ class Flight:
 
     def stand_down(self) -> None:
         """On the ground, after a failure: motors off, its own way home, no mission left. In the air the first
-        is not obeyed, and the plan's way home is needed."""
+        is not obeyed, and the plan's way home is needed. Nothing more is archived: the disk may be full."""
+        self._recorder = self._next_recorder = None
         try:
             if self.link.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, attempts=3) == ACCEPTED:
                 self._set_mode(GUIDED)  # in AUTO no mission can be cleared

@@ -94,16 +94,21 @@ def _flown(
         for text in flight.way_home:
             note(text)
         path = folder / ARCHIVE
+        recording = None
         try:
             archive = FlightArchive(path, _about(vehicle, "mavlink", plan))
         except OSError as problem:
             flight.stand_down()
-            raise BadInput(connection, f"its flight cannot be archived ({problem.strerror})", ROOM) from None
+            raise _unarchived(connection, problem) from None
         try:
             with archive as recorder, Teller(progress) as tell:
                 recording = flight.execute(recorder, tell)
         except FlightLost as lost:
             raise _cut_short(connection, timeout_s, lost, store.current().put(path)) from None
+        except OSError as problem:
+            if recording is None:  # before it took off
+                raise _unarchived(connection, problem) from None
+            note(f"The end of the flight's archive could not be written ({problem.strerror}). {ROOM}")
         recording.vehicle = vehicle
         log = _flight_log(recording, store.current().put(path), plan, connection)
         return log.model_copy(update={"way_home": flight.way_home})
@@ -193,6 +198,10 @@ def _about(vehicle: str, kind: str, plan: FlightPlan) -> dict[str, str]:
         "vehicle": vehicle,
         "origin": f"{origin.latitude_deg} {origin.longitude_deg} {origin.altitude_m}",
     }
+
+
+def _unarchived(connection: str, problem: OSError) -> BadInput:
+    return BadInput(connection, f"its flight cannot be archived ({problem.strerror})", ROOM)
 
 
 def _cut_short(connection: str, timeout_s: float, lost: "FlightLost", archive: File) -> FlightCutShort:

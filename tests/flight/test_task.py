@@ -206,6 +206,38 @@ def test_an_archive_that_cannot_be_opened_leaves_the_vehicle_as_it_was(
             assert read_parameters(link, [("RTL_ALT",)])["RTL_ALT"].param_value == 1500.0
 
 
+def test_a_disk_that_fills_before_take_off_leaves_the_vehicle_on_the_ground(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left")
+
+    monkeypatch.setattr("tasks.flight.fly.archive", full)
+    with start_vehicle(PLAN, 1) as url:
+        with pytest.raises(BadInput, match=r"cannot be archived \(No space left\)"):
+            fly.bare(PLAN, "1", url, 5.0)
+        with Link(url, 5.0) as link:
+            link.find_vehicle()
+            assert read_back(link) == ()
+
+
+def test_a_disk_that_fills_after_landing_costs_the_end_of_the_archive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(_: Any) -> None:
+        raise OSError(28, "No space left")
+
+    told: list[str] = []
+    monkeypatch.setattr("mcap.writer.Writer.finish", full)
+    monkeypatch.setattr("tasks.flight.task.note", told.append)
+    with start_vehicle(PLAN, 3) as url:
+        log = fly.bare(PLAN, "1", url, 5.0)
+    assert not log.missed
+    assert "end of the flight's archive could not be written (No space left)" in told[-1]
+    again = import_log.bare(log.archive, "flight.mcap", PLAN)
+    assert again.shots == log.shots
+
+
 def test_what_the_vehicle_warned_of_stands_beside_the_photos_that_lack() -> None:
     with start_vehicle(PLAN, 3, Faults(failsafe_s=30.0)) as url:
         cut = fly.bare(PLAN, "1", url, 5.0)
