@@ -6,7 +6,7 @@ other takes its place that has the same ends: (1, 3, H, W) RGB in 0..1 to (1, 1,
 """
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +19,7 @@ from numba import njit
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
 from tasks.detection.sauvola import Mask
+from tasks.detection.sizes import MARGIN_PX, OCTAVES, Answer, Logits, join, levels
 from tasks.detection.windows import Pieces, Window, grid, whole_of
 from tasks.heap import given_back, reused
 
@@ -26,20 +27,15 @@ DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
 SHA256 = "9c768a041ee0224d90dc2b443c311b236397e0262a24a2883a063aa18b3fda3f"
 STRIDE = 32
-OCTAVES = (3, 2, 1)  # our network is asked at 1 / 2^octave of the size too
 SEEN_PX = 6_850_000  # at once, 120 bytes each (measured): half of a photo of 12 MP and its halo
 HALO_PX = 224  # of an octave: what lies further away changes a probability by 1/255 at most (measured)
 STEP_PX = STRIDE << OCTAVES[0]  # windows begin at multiples of it: so do their pixels at each octave
 BAND_PX = 6 << 20  # pixels of an image that are read and reduced at once, unless it is wider than that
 LEAST_ROWS = 256  # of such a band
-# What its answer at half size counts where a crack is wide enough to be seen at quarter size: where that is
-# surer of the crack than the one at full size, to which a wide crack looks like a stain, and where less sure.
-SURER, LESS_SURE = 0.75, 0.5
 MANY = 16  # windows: above, memory is asked for at once and given back at the end, which costs one window
 FILL_PX = 63  # what is not known is filled from this far around
 
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
-Logits = npt.NDArray[np.float32]  # (H, W)
 
 
 class Limits(NamedTuple):
@@ -72,35 +68,6 @@ def our_model() -> Model:
     return Model(content, OURS.name, at_smaller_sizes=True, limits=OUR_LIMITS)
 
 
-class Answer(NamedTuple):
-    """What the network says of a window and the halo around it, at 1 / 2^octave of their size."""
-
-    logit: Logits
-    top_px: int
-    left_px: int
-    octave: int
-
-    def at(self, window: Window) -> Logits:
-        """Logits of a window inside, at full size."""
-        return self._at(window, np.asarray)
-
-    def sees_at(self, window: Window) -> Logits:
-        """The probabilities of a crack there, at full size."""
-        return self._at(window, _probable)
-
-    def _at(self, window: Window, of: Callable[[Logits], Logits]) -> Logits:
-        top, bottom = window.top - self.top_px, window.bottom - self.top_px
-        left, right = window.left - self.left_px, window.right - self.left_px
-        if self.octave == 0:
-            return of(self.logit[top:bottom, left:right])
-        step = 1 << self.octave
-        y, x = max(0, top // step - 1), max(0, left // step - 1)  # one more on each side, to lie between
-        part = of(self.logit[y : -(-bottom // step) + 1, x : -(-right // step) + 1])
-        size = part.shape[1] * step, part.shape[0] * step
-        whole = cv2.resize(part, size, interpolation=cv2.INTER_LINEAR)
-        return np.asarray(whole[top - y * step : bottom - y * step, left - x * step : right - x * step])
-
-
 def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:
     """(H, W) of an image that fits in memory; 0 where nothing is known. BadInput for an unfit network."""
     whole = np.zeros((raster.height_px, raster.width_px), dtype=np.uint8)
@@ -123,24 +90,15 @@ def probabilities(
         for window, wider in _windows(net, raster, rows, columns, octaves):
             valid = raster.valid(*window)
             if valid.any():
-                yield window, _of_logits(_heeded((*wider, _answer(net, raster, window, 0)), window), valid)
+                seen = window.grown(MARGIN_PX, image)
+                answer = join(_answer(net, raster, window, 0).within(seen), wider).within(window)
+                yield window, np.where(valid, levels(answer.joined), np.uint8(0))
             done_px += window.area_px
             if on_progress is not None:
                 on_progress(done_px / image.area_px)
     del net
     if many:
         given_back()
-
-
-def _heeded(answers: tuple[Answer, ...], window: Window) -> Logits:
-    """Logits of the last, largest answer, which heeds that of half its size as far as the one of a quarter
-    sees a crack; as does that one, where there are smaller ones."""
-    heeded = answers[min(1, len(answers) - 1)].at(window)
-    for quarter, full in zip(answers, answers[2:], strict=False):
-        logit = full.at(window)
-        _heed(logit, heeded, quarter.sees_at(window))
-        heeded = logit
-    return heeded
 
 
 def _longest(pieces: Pieces) -> int:
@@ -150,64 +108,34 @@ def _longest(pieces: Pieces) -> int:
 
 
 def _windows(
-    net: "_Net", raster: Raster, rows: Pieces, columns: Pieces, octaves: tuple[int, ...]
+    net: "_Net",
+    raster: Raster,
+    rows: Pieces,
+    columns: Pieces,
+    octaves: tuple[int, ...],
+    wider: tuple[Answer, ...] = (),
 ) -> Iterator[tuple[Window, tuple[Answer, ...]]]:
-    """Every row with every column, each with what the network says around it at each of the octaves: once
-    for each 2^octave × 2^octave windows, which at that size have as many pixels as one has at full size."""
+    """Every row with every column, each with what the network says around it at each of the octaves, joined:
+    once for each 2^octave × 2^octave windows, which at that size have as many pixels as one at full size."""
     if not octaves:
-        yield from ((Window(*row, *column), ()) for row in rows for column in columns)
+        yield from ((Window(*row, *column), wider) for row in rows for column in columns)
         return
     together = 1 << octaves[0]
     for high, wide in product(_lots(rows, together), _lots(columns, together)):
         if any(raster.valid(*row, *column).any() for row in high for column in wide):
             window = Window(high[0][0], high[-1][1], wide[0][0], wide[-1][1])
-            answer = _answer(net, raster, window, octaves[0])
-            for part, wider in _windows(net, raster, high, wide, octaves[1:]):
-                yield part, (answer, *wider)
+            answer = join(_answer(net, raster, window, octaves[0]), wider)
+            yield from _windows(net, raster, high, wide, octaves[1:], (*wider, answer))
 
 
 def _lots(pieces: Pieces, size: int) -> list[Pieces]:
     return [pieces[k : k + size] for k in range(0, len(pieces), size)]
 
 
-@njit(cache=True, nogil=True)
-def _sigmoid(logit: np.float32) -> np.float32:
-    one, most = np.float32(1.0), np.float32(30.0)
-    return np.float32(one / (one + np.exp(-min(max(logit, -most), most))))
-
-
-@njit(cache=True, nogil=True)
-def _probable(logit: Logits) -> Logits:
-    p = np.empty(logit.shape, np.float32)
-    for y in range(logit.shape[0]):
-        for x in range(logit.shape[1]):
-            p[y, x] = _sigmoid(logit[y, x])
-    return p
-
-
-@njit(cache=True, nogil=True)
-def _heed(logit: Logits, half: Logits, quarter: Logits) -> None:
-    """In place: what the network answers at half size, as far as it sees a crack (0..1) at quarter size."""
-    for y in range(logit.shape[0]):
-        for x in range(logit.shape[1]):
-            more = half[y, x] - logit[y, x]
-            share = np.float32(SURER if more > 0 else LESS_SURE)
-            logit[y, x] += share * quarter[y, x] * more
-
-
-@njit(cache=True, nogil=True)
-def _of_logits(logit: Logits, valid: Mask) -> Probability:
-    p = np.zeros(logit.shape, dtype=np.uint8)
-    for y in range(logit.shape[0]):
-        for x in range(logit.shape[1]):
-            if valid[y, x]:
-                p[y, x] = np.uint8(np.rint(np.float32(255.0) * _sigmoid(logit[y, x])))
-    return p
-
-
 def _answer(net: "_Net", raster: Raster, window: Window, octave: int) -> Answer:
     seen = window.grown(HALO_PX << octave, whole_of(raster))
-    return Answer(net.logits(_reduced(raster, seen, octave)), seen.top, seen.left, octave)
+    logits = net.logits(_reduced(raster, seen, octave))
+    return Answer(logits, logits, seen.top, seen.left, octave)
 
 
 def _reduced(raster: Raster, window: Window, octave: int) -> Pixels:

@@ -137,6 +137,24 @@ def on_photos(name: str) -> Iterator[Row]:
         yield row(f"length of {one.method} true at {d} px", one.length.precision, "1", None, name, None)
 
 
+def enlarged() -> Iterator[Row]:
+    """F1 of `hairline` on the same photos enlarged, as if from nearer and less sharp."""
+    name = "deepcrack_train"
+    if not (ROOT / "cracks" / name).is_dir():
+        yield absent(f"F1 on {name}, enlarged", "", "the set is not on this machine")
+        return
+    for factor in (2, 4):
+        tallies = []
+        for rgb, truth in _of_set(name):
+            large = cv2.resize(rgb, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC)
+            mask = detect_image(np.asarray(large, np.uint8), None, ALL["hairline"], None).mask
+            small = cv2.resize(mask.astype(np.float32), truth.shape[::-1], interpolation=cv2.INTER_AREA)
+            tallies.append(tally(np.asarray(small) >= 0.5, truth))
+        for one in evaluate("hairline", tallies):
+            what = f"F1 of hairline at {one.tolerance_px} px"
+            yield row(what, one.aggregate.f1, "1", None, f"{name}, enlarged {factor} times", None)
+
+
 def _of_set(name: str) -> Iterator[tuple[Pixels, Mask]]:
     """Photos and what somebody drew on them; "SET, fold N": one fold of the set, by group."""
     folder = ROOT / "cracks" / name.split(",")[0]
@@ -258,6 +276,7 @@ def speed() -> Iterator[Row]:
 
 PARTS = {
     "photos": photos,
+    "enlarged": enlarged,
     "folds": folds,
     "false-cracks": false_cracks,
     "false-on-photos": false_on_photos,

@@ -1,0 +1,131 @@
+"""One answer of those that the network gives at full size, at half of it, and so on.
+
+A wide crack looks like a stain from near and is seen whole at a smaller size; a thin one is seen at full size
+alone. So each size heeds that of half of it, as far as that of a quarter sees a crack, which is wide then.
+And what is wide at one size but not seen at half of it is no crack: so look the gaps between the stones of a
+blurred photo.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from tasks.detection.windows import Window
+
+OCTAVES = (4, 3, 2, 1)  # the network is asked at 1 / 2^octave of the size too
+# What the answer at half the size counts where it is surer of a crack that is seen at a quarter, and where it
+# is less sure.
+SURER, LESS_SURE = 0.9, 0.5
+WIDE_PX = 11  # across: so wide a crack is seen at half the size too
+MARGIN_PX = 16  # to look for what is wide
+
+Logits = npt.NDArray[np.float32]  # (H, W)
+Levels = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
+
+
+class Answer(NamedTuple):
+    """What the network says of a part of an image at 1 / 2^octave of its size."""
+
+    alone: Logits
+    joined: Logits  # with what it says at smaller sizes
+    top_px: int  # of the part, at full size
+    left_px: int
+    octave: int
+
+    def within(self, window: Window) -> "Answer":
+        """Of a window of full size alone; octave 0."""
+        rows = slice(window.top - self.top_px, window.bottom - self.top_px)
+        columns = slice(window.left - self.left_px, window.right - self.left_px)
+        return Answer(self.alone[rows, columns], self.joined[rows, columns], window.top, window.left, 0)
+
+    def heeded_by(self, finer: "Answer") -> Logits:
+        """The joined logits where a finer answer is, at its size."""
+        return self._enlarged(finer, lambda rows, columns: self.joined[rows, columns])
+
+    def sees_of(self, finer: "Answer") -> Logits:
+        """The probabilities of a crack there."""
+        return self._enlarged(finer, lambda rows, columns: _probable(self.joined[rows, columns]))
+
+    def likeliest_of(self, finer: "Answer") -> Logits:
+        """The larger of the logits alone and joined there."""
+        return self._enlarged(
+            finer, lambda rows, columns: np.maximum(self.alone[rows, columns], self.joined[rows, columns])
+        )
+
+    def _enlarged(self, finer: "Answer", part: Callable[[slice, slice], Logits]) -> Logits:
+        step = 1 << (self.octave - finer.octave)
+        top, left = (
+            (finer.top_px - self.top_px) >> finer.octave,
+            (finer.left_px - self.left_px) >> finer.octave,
+        )
+        height, width = finer.alone.shape
+        y, x = max(0, top // step - 1), max(0, left // step - 1)  # one more on each side, to lie between
+        small = part(slice(y, -(-(top + height) // step) + 1), slice(x, -(-(left + width) // step) + 1))
+        size = small.shape[1] * step, small.shape[0] * step
+        whole = cv2.resize(small, size, interpolation=cv2.INTER_LINEAR)
+        top, left = top - y * step, left - x * step
+        return np.asarray(whole[top : top + height, left : left + width])
+
+
+def join(alone: Answer, wider: tuple[Answer, ...]) -> Answer:
+    """An answer with those of smaller sizes around it, the smallest first."""
+    if not wider:
+        return alone
+    joined = alone.alone.copy()
+    if len(wider) > 1:
+        _heed(joined, wider[-1].heeded_by(alone), wider[-2].sees_of(alone))
+    _doubt(joined, wider[-1].likeliest_of(alone), _wide(levels(joined)))
+    return alone._replace(joined=joined)
+
+
+def _wide(p: Levels) -> Levels:
+    """What is left of it where it is less than WIDE_PX wide."""
+    return np.asarray(cv2.morphologyEx(p, cv2.MORPH_OPEN, np.ones((WIDE_PX, WIDE_PX), np.uint8)), np.uint8)
+
+
+@njit(cache=True, nogil=True)
+def _sigmoid(logit: np.float32) -> np.float32:
+    one, most = np.float32(1.0), np.float32(30.0)
+    return np.float32(one / (one + np.exp(-min(max(logit, -most), most))))
+
+
+@njit(cache=True, nogil=True)
+def _probable(logit: Logits) -> Logits:
+    p = np.empty(logit.shape, np.float32)
+    for y in range(logit.shape[0]):
+        for x in range(logit.shape[1]):
+            p[y, x] = _sigmoid(logit[y, x])
+    return p
+
+
+@njit(cache=True, nogil=True)
+def levels(logit: Logits) -> Levels:
+    p = np.empty(logit.shape, dtype=np.uint8)
+    for y in range(logit.shape[0]):
+        for x in range(logit.shape[1]):
+            p[y, x] = np.uint8(np.rint(np.float32(255.0) * _sigmoid(logit[y, x])))
+    return p
+
+
+@njit(cache=True, nogil=True)
+def _heed(logit: Logits, half: Logits, quarter: Logits) -> None:
+    """In place: what half the size says, as far as a quarter of it sees a crack (0..1)."""
+    for y in range(logit.shape[0]):
+        for x in range(logit.shape[1]):
+            more = half[y, x] - logit[y, x]
+            share = np.float32(SURER if more > 0 else LESS_SURE)
+            logit[y, x] += share * quarter[y, x] * more
+
+
+@njit(cache=True, nogil=True)
+def _doubt(logit: Logits, half: Logits, wide: Levels) -> None:
+    """In place: no more than half the size says, as far as it is wide (0..255)."""
+    for y in range(logit.shape[0]):
+        for x in range(logit.shape[1]):
+            if wide[y, x] > 0 and half[y, x] < logit[y, x]:
+                share = np.float32(wide[y, x]) / np.float32(255.0)
+                logit[y, x] += share * (half[y, x] - logit[y, x])
