@@ -14,10 +14,11 @@ from tasks.detection.components import components
 from tasks.detection.sauvola import Grey, Mask, grey_of
 
 BESIDE_PX = (3.0, 6.0)  # distances from the component's rim that count as right beside it
-FURTHER_PX = (10.0, 16.0)  # and as further away
+FURTHER_PX = (10.0, 16.0)  # and as further away; both in proportion beside what is wider than
+NARROW_PX = 12.0  # since wide cracks are seen at a smaller size, from nearer and less sharp
+WIDEST = 4.0  # times as wide: further away all sorts of things lie
 SHARP = 0.7  # least share of the contrast that is reached right beside it; of 99 in 100 real cracks .78 is
 ENOUGH_PX = 10  # pixels that a ring must have to be judged by
-MARGIN_PX = int(FURTHER_PX[1]) + 1
 TILE_PX = 1024  # of a component that are looked at together
 
 
@@ -42,9 +43,10 @@ def without_soft(pixels: Marked, raster: Raster, dark: BitMask) -> tuple[Marked,
 def _is_sharp(y: Indices, x: Indices, raster: Raster, dark: BitMask) -> bool:
     """Of the component that has these pixels, row by row."""
     core, beside, further = [], [], []
-    for inside, surface, grey, own in _tiles(y, x, raster, dark):
+    reach = min(max(1.0, _width_px(y, x) / NARROW_PX), WIDEST)
+    for inside, surface, grey, own in _tiles(y, x, raster, dark, int(reach * FURTHER_PX[1]) + 1):
         core.append(grey[inside & own])
-        away = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5)
+        away = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5) / reach
         beside.append(grey[surface & own & (away >= BESIDE_PX[0]) & (away <= BESIDE_PX[1])])
         further.append(grey[surface & own & (away >= FURTHER_PX[0]) & (away <= FURTHER_PX[1])])
     near, far = np.concatenate(beside), np.concatenate(further)
@@ -54,14 +56,24 @@ def _is_sharp(y: Indices, x: Indices, raster: Raster, dark: BitMask) -> bool:
     return float(near.mean()) - darkness >= SHARP * (float(far.mean()) - darkness)
 
 
-def _tiles(y: Indices, x: Indices, raster: Raster, dark: BitMask) -> Iterator[tuple[Mask, Mask, Grey, Mask]]:
+def _width_px(y: Indices, x: Indices) -> float:
+    """Mean length of the runs of pixels along rows, or along columns where these are shorter."""
+    turned = np.lexsort((y, x))
+    rows = np.count_nonzero((np.diff(y) != 0) | (np.diff(x) != 1))
+    columns = np.count_nonzero((np.diff(x[turned]) != 0) | (np.diff(y[turned]) != 1))
+    return len(y) / (max(rows, columns) + 1)
+
+
+def _tiles(
+    y: Indices, x: Indices, raster: Raster, dark: BitMask, margin_px: int
+) -> Iterator[tuple[Mask, Mask, Grey, Mask]]:
     """Piece by piece: the component's pixels, the surface around them, its grey levels, and which pixels
     belong to no other piece."""
-    bottom, right = int(y[-1]) + MARGIN_PX + 1, int(x.max()) + MARGIN_PX + 1
-    for top in range(max(0, int(y[0]) - MARGIN_PX), min(raster.height_px, bottom), TILE_PX):
-        for left in range(max(0, int(x.min()) - MARGIN_PX), min(raster.width_px, right), TILE_PX):
-            y0, y1 = max(0, top - MARGIN_PX), min(raster.height_px, bottom, top + TILE_PX + MARGIN_PX)
-            x0, x1 = max(0, left - MARGIN_PX), min(raster.width_px, right, left + TILE_PX + MARGIN_PX)
+    bottom, right = int(y[-1]) + margin_px + 1, int(x.max()) + margin_px + 1
+    for top in range(max(0, int(y[0]) - margin_px), min(raster.height_px, bottom), TILE_PX):
+        for left in range(max(0, int(x.min()) - margin_px), min(raster.width_px, right), TILE_PX):
+            y0, y1 = max(0, top - margin_px), min(raster.height_px, bottom, top + TILE_PX + margin_px)
+            x0, x1 = max(0, left - margin_px), min(raster.width_px, right, left + TILE_PX + margin_px)
             rows = slice(*np.searchsorted(y, (y0, y1)))
             here = (x[rows] >= x0) & (x[rows] < x1)
             if not here.any():

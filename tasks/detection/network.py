@@ -92,7 +92,8 @@ def probabilities(
             if valid.any():
                 seen = window.grown(MARGIN_PX, image)
                 answer = join(_answer(net, raster, window, 0).within(seen), wider).within(window)
-                yield window, np.where(valid, levels(answer.joined), np.uint8(0))
+                known = np.where(valid, levels(np.asarray(answer.joined, np.float32)), np.uint8(0))
+                yield window, known
             done_px += window.area_px
             if on_progress is not None:
                 on_progress(done_px / image.area_px)
@@ -124,7 +125,7 @@ def _windows(
     for high, wide in product(_lots(rows, together), _lots(columns, together)):
         if any(raster.valid(*row, *column).any() for row in high for column in wide):
             window = Window(high[0][0], high[-1][1], wide[0][0], wide[-1][1])
-            answer = join(_answer(net, raster, window, octaves[0]), wider)
+            answer = join(_answer(net, raster, window, octaves[0]), wider).halved()
             yield from _windows(net, raster, high, wide, octaves[1:], (*wider, answer))
 
 
