@@ -76,18 +76,32 @@ def connected(pixels: Marked, reach_px: int = 0) -> tuple[Indices, int]:
     bands = _Bands(pixels.width_px)
     for top in range(0, pixels.height_px, BAND_PX):
         bottom = min(pixels.height_px, top + BAND_PX)
-        count, labels = cv2.connectedComponents(_grown(pixels, top, bottom, reach_px), connectivity=8)
+        grown = _grown(pixels, np.ones_like(pixels.level), top, bottom, reach_px)
+        count, labels = cv2.connectedComponents(grown, connectivity=8)
         here = slice(*np.searchsorted(pixels.y, (top, bottom)))
         label[here] = labels[pixels.y[here] - top, pixels.x[here]] + bands.count
         bands.add(np.asarray(labels, dtype=np.int32), count - 1)
     return _in_order(bands.joined()[label])
 
 
-def _grown(pixels: Marked, top: int, bottom: int, reach_px: int) -> npt.NDArray[np.uint8]:
-    """(bottom - top, W): 1 where a pixel is at most reach_px away along either axis."""
+def highest_near(pixels: Marked, reach_px: int) -> npt.NDArray[np.uint8]:
+    """(n,) the highest level of all that are at most reach_px away from each along either axis."""
+    highest = np.zeros_like(pixels.level)
+    for top in range(0, pixels.height_px, BAND_PX):
+        bottom = min(pixels.height_px, top + BAND_PX)
+        here = slice(*np.searchsorted(pixels.y, (top, bottom)))
+        grown = _grown(pixels, pixels.level, top, bottom, reach_px)
+        highest[here] = grown[pixels.y[here] - top, pixels.x[here]]
+    return highest
+
+
+def _grown(
+    pixels: Marked, value: npt.NDArray[np.uint8], top: int, bottom: int, reach_px: int
+) -> npt.NDArray[np.uint8]:
+    """(bottom - top, W): the highest value of the pixels at most reach_px away along either axis."""
     near = slice(*np.searchsorted(pixels.y, (top - reach_px, bottom + reach_px)))
     dense = np.zeros((bottom - top + 2 * reach_px, pixels.width_px), dtype=np.uint8)
-    dense[pixels.y[near] - top + reach_px, pixels.x[near]] = 1
+    dense[pixels.y[near] - top + reach_px, pixels.x[near]] = value[near]
     side = 2 * reach_px + 1
     grown = cv2.dilate(dense, np.ones((side, side), np.uint8)) if reach_px else dense
     return np.asarray(grown[reach_px : reach_px + bottom - top], dtype=np.uint8)

@@ -1,10 +1,11 @@
 """From probabilities to cracks: what hangs together is judged as a whole.
 
-A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). Pieces that are
-hardly apart, as where the edge of a shadow crosses a crack, are one candidate: half a crack is often as
-straight as a joint. Its score is the probability that one of its strength and straightness is a crack,
-fitted on photos and surfaces that the network had not seen (training.calibrate): so one threshold stands for
-one rate of false alarms.
+A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). The middle of a
+faint crack is no likelier than the blurred rim of a dark one, so a rim ends where there is a third of the
+likeliest nearby. Pieces that are hardly apart, as where the edge of a shadow crosses a crack, are one
+candidate: half a crack is often as straight as a joint. Its score is the probability that one of its strength
+and straightness is a crack, fitted on photos and surfaces that the network had not seen (training.calibrate):
+so one threshold stands for one rate of false alarms.
 """
 
 from typing import NamedTuple
@@ -12,10 +13,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tasks.connected import Marked
+from tasks.connected import Marked, highest_near
 from tasks.detection.components import Components, components
 from tasks.detection.network import Limits
 
+RIM = 1 / 3  # of the highest probability within RIM_PX: what has less is no crack but its blurred rim
+RIM_PX = 12
 REACH_PX = 5  # pieces of one crack are at most twice as far apart; at 5, 20 or 40 px all is alike
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
 WEIGHTS = (1.843, -1.515, -0.454, -1.599)  # of the features, from training.calibrate
@@ -44,8 +47,8 @@ class Candidates(NamedTuple):
 def candidates(pixels: Marked, limits: Limits) -> Candidates:
     """What hangs together of the connected pixels that hold one of at least `sure`, each with its score.
     pixels: those of at least `edge`; their level is 255 × the probability."""
-    pieces = components(pixels)
-    sure = pieces.keep(pieces.holding(pixels.level >= limits.sure))
+    pieces = components(pixels.where(pixels.level >= RIM * highest_near(pixels, RIM_PX)))
+    sure = pieces.keep(pieces.holding(pieces.pixels.level >= limits.sure))
     found = components(sure, REACH_PX)
     score = score_of(features(found))
     score[0] = 0.0
