@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.bit_mask import BitMask
-from tasks.connected import Marked, at_least, connected, regions
+from tasks.connected import Marked, at_least, connected, highest_near, regions
 
 
 def blotches(seed: int, height: int = 1400, width: int = 90) -> np.ndarray:
@@ -74,3 +74,13 @@ def test_levels_stay_with_their_pixels_whatever_the_order_of_the_windows() -> No
         (one == other).all()
         for one, other in zip(Marked.gathered(20, 30, parts)[2:], Marked.of_levels(levels)[2:], strict=True)
     )
+
+
+@given(st.integers(0, 999), st.integers(0, 6))
+@settings(max_examples=10)
+def test_the_highest_nearby_is_that_of_the_whole_image(seed: int, reach_px: int) -> None:
+    rng = np.random.default_rng(seed)
+    levels = np.where(rng.random((1400, 90)) < 0.05, rng.integers(1, 256, (1400, 90)), 0).astype(np.uint8)
+    highest = cv2.dilate(levels, np.ones((2 * reach_px + 1,) * 2, np.uint8))
+    pixels = Marked.of_levels(levels)
+    assert (highest_near(pixels, reach_px) == highest[pixels.y, pixels.x]).all()

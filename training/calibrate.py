@@ -3,7 +3,7 @@
 On photos of a fold that training left out, and on surfaces it never saw, this fits
 - slope and offset of the logits, so that of the photos' pixels called 70 % seven in ten are crack (Platt
   1999), for training.export; with the network so calibrated this is run once more;
-- the weights of a candidate's score (tasks.detection.candidates): its strength and bend against
+- the weights of a candidate's score (tasks.detection.candidates): strength, bend, elongation, against
   whether most of it lies on a crack that somebody drew;
 and counts false cracks on the surfaces without any, for each least score. Nothing else is fitted on anything.
 """
@@ -27,6 +27,9 @@ NEAR_PX = 3
 LEAST_PX = 30.0  # as in the settings where no scale is known
 GSD_MM_PX = 0.5  # assumed, to say false cracks per area
 LEAST_MM = 50.0
+# Of the score's weights, 1/σ² of a prior around 0: that of the elongation counts half of what the candidates
+# ask for by themselves, since among them wide gaps are few.
+DECAY = np.array([0.1, 0.1, 0.1, 25.0, 0.1])
 
 Mask = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]
@@ -50,13 +53,16 @@ def _seen(model: Model, folder: Path, names: list[str]) -> Iterator[tuple[Probab
         yield p, np.asarray(mask) > DOUBTFUL
 
 
-def logistic(features: Floats, truth: Mask, weights: Floats, decay: float = 1e-3) -> Floats:
-    """Coefficients (k,) of a logistic regression on (n, k) features, by Newton's method."""
+def logistic(features: Floats, truth: Mask, weights: Floats, decay: float | Floats = 1e-3) -> Floats:
+    """Coefficients (k,) of a logistic regression on (n, k) features, by Newton's method. decay: of each."""
     w = np.zeros(features.shape[1])
+    decay = np.broadcast_to(decay, len(w))
     for _ in range(50):
         p = 1.0 / (1.0 + np.exp(-np.clip(features @ w, -30, 30)))
         gradient = features.T @ (weights * (p - truth)) + decay * w
-        hessian = (features * (weights * p * (1 - p))[:, None]).T @ features + decay * np.eye(len(w))
+        hessian = (features * (weights * p * (1 - p))[:, None]).T @ features + np.diag(
+            np.broadcast_to(decay, len(w))
+        )
         w = w - np.linalg.solve(hessian, gradient)
     return w
 
@@ -99,7 +105,7 @@ def main(model_path: Path, photos: Path, fold: int, folders: list[Path]) -> None
     print(f"logits: slope {slope:.3f}, offset {offset:+.3f} (1 and 0 where they are calibrated already)")
     seen, truths = zip(*(judged(p, truth, LEAST_PX) for p, truth in of_photos + of_surfaces), strict=True)
     x, y = np.vstack(seen), np.concatenate(truths)
-    w = logistic(x, y, np.ones(len(y)), decay=0.1)
+    w = logistic(x, y, np.ones(len(y)), DECAY)
     print(f"{len(y)} candidates, {y.sum()} cracks: WEIGHTS = {w.round(3).tolist()}")
     score = 1.0 / (1.0 + np.exp(-(x @ w)))
     for low, high in ((0.0, 0.2), (0.2, 0.4), (0.4, 0.6), (0.6, 0.8), (0.8, 1.0)):

@@ -3,9 +3,9 @@
 A crack starts where the network is sure and goes on while it is fairly sure (hysteresis). The middle of a
 faint crack is no likelier than the blurred rim of a dark one, so a rim ends where there is a third of the
 likeliest nearby. Pieces that are hardly apart, as where the edge of a shadow crosses a crack, are one
-candidate: half a crack is often as straight as a joint. Its score is the probability that one of its strength
-and straightness is a crack, fitted on photos and surfaces that the network had not seen (training.calibrate):
-so one threshold stands for one rate of false alarms.
+candidate: half a crack is often as straight as a joint. Its score is the probability that one as strong,
+straight and slender is a crack, fitted on photos and surfaces that the network had not seen
+(training.calibrate): so one threshold stands for one rate of false alarms.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,7 @@ RIM = 1 / 3  # of the highest probability within RIM_PX: what has less is no cra
 RIM_PX = 12
 REACH_PX = 5  # pieces of one crack are at most twice as far apart; at 5, 20 or 40 px all is alike
 STRONGEST = 254.5 / 255.0  # nothing is surer than its last bit
-WEIGHTS = (1.843, -1.515, -0.454, -1.599)  # of the features, from training.calibrate
+WEIGHTS = (1.634, -0.946, -0.363, 0.335, -2.006)  # of the features, from training.calibrate
 
 Floats = npt.NDArray[np.float64]
 
@@ -56,17 +56,18 @@ def candidates(pixels: Marked, limits: Limits) -> Candidates:
 
 
 def features(found: Components) -> Floats:
-    """(n, 4) by label: logit of the strength, the bend and its square, 1.
+    """(n, 5) by label: logit of the strength, the bend and its square, ln of the elongation, 1.
 
     The bend is ln(short / long) of the axes of inertia: a ruled line of 300 px has −5, a crack −3 to −1, a
     ring 0. Both ends are rarely cracks, hence the square."""
     p = np.clip(strength(found), 1.0 - STRONGEST, STRONGEST)
     bend = _bend(found)
-    return np.column_stack([np.log(p / (1.0 - p)), bend, bend**2, np.ones(len(p))])
+    elongation = np.log(np.maximum(found.elongation, 1.0))
+    return np.column_stack([np.log(p / (1.0 - p)), bend, bend**2, elongation, np.ones(len(p))])
 
 
 def score_of(of_candidates: Floats) -> Floats:
-    """(n,) logistic in the (n, 4) features."""
+    """(n,) logistic in the (n, 5) features."""
     return np.asarray(1.0 / (1.0 + np.exp(-(of_candidates @ np.asarray(WEIGHTS)))))
 
 

@@ -30,8 +30,8 @@ STRIDE = 32
 SEEN_PX = 6_850_000  # at once, 120 bytes each (measured): half of a photo of 12 MP and its halo
 HALO_PX = 224  # of an octave: what lies further away changes a probability by 1/255 at most (measured)
 STEP_PX = STRIDE << OCTAVES[0]  # windows begin at multiples of it: so do their pixels at each octave
-BAND_PX = 6 << 20  # pixels of an image that are read and reduced at once, unless it is wider than that
-LEAST_ROWS = 256  # of such a band
+BAND_PX = 4 << 20  # pixels of an image that are read and reduced at once, unless it is wider than that
+LEAST_ROWS = 128  # of such a band
 MANY = 16  # windows: above, memory is asked for at once and given back at the end, which costs one window
 FILL_PX = 63  # what is not known is filled from this far around
 
@@ -145,15 +145,23 @@ def _reduced(raster: Raster, window: Window, octave: int) -> Pixels:
     rows = max(LEAST_ROWS, BAND_PX // (window.right - window.left) // STRIDE * STRIDE)
     for top in range(window.top, window.bottom, rows):
         bottom = min(window.bottom, top + rows)
-        y0, y1 = max(window.top, top - FILL_PX), min(window.bottom, bottom + FILL_PX)
-        read = Window(y0, y1, window.left, window.right)
-        rgb = filled(raster.rgb(*read), raster.valid(*read))[top - y0 : bottom - y0]
+        rgb = _known(raster, window._replace(top=top, bottom=bottom), window)
         down, right = -rgb.shape[0] % (1 << octave), -rgb.shape[1] % (1 << octave)
         even = cv2.copyMakeBorder(rgb, 0, down, 0, right, cv2.BORDER_REFLECT_101)
         size = even.shape[1] >> octave, even.shape[0] >> octave
         small = cv2.resize(even, size, interpolation=cv2.INTER_AREA) if octave else even
         bands.append(np.asarray(small, dtype=np.uint8))
     return np.concatenate(bands)
+
+
+def _known(raster: Raster, band: Window, within: Window) -> Pixels:
+    """(H, W, 3) of a band, what is unknown filled from the rows around it."""
+    if raster.valid(*band).all():
+        return raster.rgb(*band)
+    seen = Window(
+        max(within.top, band.top - FILL_PX), min(within.bottom, band.bottom + FILL_PX), band.left, band.right
+    )
+    return filled(raster.rgb(*seen), raster.valid(*seen))[band.inside(seen)]
 
 
 def filled(rgb: Pixels, valid: Mask) -> Pixels:

@@ -45,6 +45,14 @@ def test_a_candidate_needs_a_pixel_that_is_sure() -> None:
     assert candidates(np.zeros((5, 5), np.uint8), OUR_LIMITS).score.tolist() == [0.0]
 
 
+def test_the_rim_of_a_sure_crack_is_none_and_as_likely_a_faint_crack_is_whole() -> None:
+    rim = int(judged.RIM * 250) - 1
+    sure = candidates(line((rim, 250, rim)), OUR_LIMITS).found
+    assert set(sure.pixels.y.tolist()) == {11} and sure.area_px[1] == 60
+    faint = candidates(line((rim, SURE, rim)), OUR_LIMITS).found
+    assert set(faint.pixels.y.tolist()) == {10, 11, 12} and faint.area_px[1] == 180
+
+
 def test_what_is_likelier_no_crack_is_none_by_a_guest() -> None:
     p = line((120, 120))
     assert candidates(p, OUR_LIMITS).score.max() > 0.0 == candidates(p, USUAL_LIMITS).score.max()
