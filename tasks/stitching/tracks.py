@@ -41,15 +41,12 @@ def build_tracks(edges: Sequence[Edge], features: Sequence[PhotoFeatures]) -> Ob
         return Observations(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2)))
     a = np.concatenate([start[e.a] + e.matches[:, 0] for e in edges])
     b = np.concatenate([start[e.b] + e.matches[:, 1] for e in edges])
-    seen, feature = np.unique(np.concatenate([a, b]), return_inverse=True)
-    of_seen = np.searchsorted(start, seen, side="right") - 1
-    xy_of_seen = np.concatenate([f.xy for f in features])[seen].astype(np.float64)
-    places, place = np.unique(np.column_stack([of_seen, xy_of_seen]), axis=0, return_inverse=True)
-    nodes = np.arange(len(places))
-    pairs = place.ravel()[feature.ravel()].reshape(2, -1)
+    nodes, inverse = np.unique(np.concatenate([a, b]), return_inverse=True)
+    pairs = inverse.reshape(2, -1)
     graph = coo_matrix((np.ones(len(a)), (pairs[0], pairs[1])), shape=(len(nodes), len(nodes)))
     _, label = connected_components(graph, directed=False)
-    photo, xy = places[:, 0].astype(np.int64), np.ascontiguousarray(places[:, 1:])
+    photo = np.searchsorted(start, nodes, side="right") - 1
+    xy = np.concatenate([f.xy for f in features])[nodes].astype(np.float64)
     order = np.lexsort((nodes, photo, label))
     label, photo, xy = label[order].astype(np.int64), photo[order], xy[order]
     repeats = np.zeros(len(label), bool)
