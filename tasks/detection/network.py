@@ -45,7 +45,7 @@ class Limits(NamedTuple):
     sure: int
 
 
-OUR_LIMITS = Limits(51, 90)  # faint cracks whole; what is seen no surer than by chance is left to the score
+OUR_LIMITS = Limits(51, 90)  # so low that faint cracks are found whole; what is none tells the score
 USUAL_LIMITS = Limits(128, 179)  # of a guest: more likely crack than not; nobody fitted anything to it
 
 
@@ -125,7 +125,7 @@ def _windows(
     for high, wide in product(_lots(rows, together), _lots(columns, together)):
         if any(raster.valid(*row, *column).any() for row in high for column in wide):
             window = Window(high[0][0], high[-1][1], wide[0][0], wide[-1][1])
-            answer = join(_answer(net, raster, window, octaves[0]), wider).halved()
+            answer = join(_answer(net, raster, window, octaves[0]), wider).compact()
             yield from _windows(net, raster, high, wide, octaves[1:], (*wider, answer))
 
 

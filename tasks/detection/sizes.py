@@ -39,31 +39,31 @@ class Answer(NamedTuple):
     octave: int
 
     def within(self, window: Window) -> "Answer":
-        """Of a window of full size alone; octave 0."""
+        """Its part in a window; of an answer at full size."""
         rows = slice(window.top - self.top_px, window.bottom - self.top_px)
         columns = slice(window.left - self.left_px, window.right - self.left_px)
         return Answer(self.alone[rows, columns], self.joined[rows, columns], window.top, window.left, 0)
 
     def rows(self, top: int, bottom: int) -> "Answer":
-        """Some of its own rows alone."""
+        """Its part from row `top` to row `bottom`, of its own."""
         at_px = self.top_px + (top << self.octave)
         return self._replace(alone=self.alone[top:bottom], joined=self.joined[top:bottom], top_px=at_px)
 
-    def halved(self) -> "Answer":
+    def compact(self) -> "Answer":
         """In half the memory: off by less than a thousandth of a probability."""
         return self._replace(alone=self.alone.astype(np.float16), joined=self.joined.astype(np.float16))
 
-    def heeded_by(self, finer: "Answer") -> Logits:
-        """The joined logits where a finer answer is, at its size."""
+    def joined_at(self, finer: "Answer") -> Logits:
+        """The joined logits where a finer answer lies, at its size."""
         return self._enlarged(finer, lambda rows, columns: self.joined[rows, columns])
 
-    def sees_of(self, finer: "Answer") -> Logits:
+    def probable_at(self, finer: "Answer") -> Logits:
         """The probabilities of a crack there."""
         return self._enlarged(
             finer, lambda rows, columns: _probable(self.joined[rows, columns].astype(np.float32))
         )
 
-    def likeliest_of(self, finer: "Answer") -> Logits:
+    def likeliest_at(self, finer: "Answer") -> Logits:
         """The larger of the logits alone and joined there."""
         return self._enlarged(
             finer, lambda rows, columns: np.maximum(self.alone[rows, columns], self.joined[rows, columns])
@@ -100,13 +100,13 @@ def join(alone: Answer, wider: tuple[Answer, ...]) -> Answer:
 def _joined(alone: Answer, wider: tuple[Answer, ...]) -> Logits:
     logit = alone.alone.astype(np.float32)
     if len(wider) > 1:
-        _heed(logit, wider[-1].heeded_by(alone), wider[-2].sees_of(alone))
-    _doubt(logit, wider[-1].likeliest_of(alone), _wide(levels(logit)))
+        _heed(logit, wider[-1].joined_at(alone), wider[-2].probable_at(alone))
+    _doubt(logit, wider[-1].likeliest_at(alone), _wide(levels(logit)))
     return logit
 
 
 def _wide(p: Levels) -> Levels:
-    """What is left of it where it is less than WIDE_PX wide."""
+    """That of what is at least WIDE_PX wide; of what is thinner little is left."""
     return np.asarray(cv2.morphologyEx(p, cv2.MORPH_OPEN, np.ones((WIDE_PX, WIDE_PX), np.uint8)), np.uint8)
 
 
@@ -127,6 +127,7 @@ def _probable(logit: Logits) -> Logits:
 
 @njit(cache=True, nogil=True)
 def levels(logit: Logits) -> Levels:
+    """255 × the probability."""
     p = np.empty(logit.shape, dtype=np.uint8)
     for y in range(logit.shape[0]):
         for x in range(logit.shape[1]):

@@ -44,10 +44,10 @@ def test_a_smaller_answer_is_enlarged_to_where_a_finer_one_lies() -> None:
     whole = cv2.resize(small, (400, 320), interpolation=cv2.INTER_LINEAR)
     quarter = Answer(small, small, 64, 128, 3)
     fine = Answer(np.zeros((90, 77), np.float32), np.zeros((90, 77), np.float32), 64 + 40, 128 + 51, 0)
-    assert np.allclose(quarter.heeded_by(fine), whole[40:130, 51:128], atol=1e-6)
+    assert np.allclose(quarter.joined_at(fine), whole[40:130, 51:128], atol=1e-6)
     half = Answer(np.zeros((60, 70), np.float32), np.zeros((60, 70), np.float32), 64 + 64, 128 + 96, 1)
     at_half = cv2.resize(small, (200, 160), interpolation=cv2.INTER_LINEAR)
-    assert np.allclose(quarter.heeded_by(half), at_half[32:92, 48:118], atol=1e-6)
+    assert np.allclose(quarter.joined_at(half), at_half[32:92, 48:118], atol=1e-6)
 
 
 def test_an_answer_within_a_window_is_the_part_of_it_there() -> None:
