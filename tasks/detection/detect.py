@@ -14,6 +14,7 @@ from tasks.detection.candidates import Scored, candidates
 from tasks.detection.components import long_and_thin
 from tasks.detection.edges import without_soft
 from tasks.detection.global_threshold import PAPER, Histogram, darker_than, from_peaks, otsu
+from tasks.detection.half_size import HalfSize, seen_at_half_size
 from tasks.detection.joints import Joint, without_joints
 from tasks.detection.network import Model, our_model, probabilities
 from tasks.detection.paper import paper_mask
@@ -110,6 +111,21 @@ def _ridge(
     least_px: float,
     on_progress: Progress | None,
 ) -> DetectionArrays:
+    """What stands out at full size; what of it is wide, at half of it too."""
+    kept, joints, stains = _ridges(raster, settings, scale, least_px, on_progress)
+    if min(raster.height_px, raster.width_px) > 2 * scale.window:  # a quarter of the work
+        half, _, _ = _ridges(HalfSize(raster), settings, scale, least_px / 2, None)
+        kept = seen_at_half_size(kept, half.mask)
+    return DetectionArrays(kept.mask, count_valid(raster), tuple(joints), tuple(stains))
+
+
+def _ridges(
+    raster: Raster,
+    settings: DetectSettings,
+    scale: Scale,
+    least_px: float,
+    on_progress: Progress | None,
+) -> tuple[Marked, list[Joint], list[tuple[float, float]]]:
     def dark_in(window: Window, seen: Window) -> Part:
         levels = dark_levels(grey_of(raster.rgb(*seen)), raster.valid(*seen), scale, settings.k, settings.R)
         return at_least(1, levels[window.inside(seen)], window.top, window.left)
@@ -118,8 +134,7 @@ def _ridge(
     dark = Marked.gathered(raster.height_px, raster.width_px, parts)
     kept, stains = without_soft(long_and_thin(dark, SEED, least_px), raster, dark.mask)
     kept, joints = without_joints(kept, JOINT_LENGTHS * least_px, least_px)
-    mask = long_and_thin(kept, SEED, least_px).mask
-    return DetectionArrays(mask, count_valid(raster), tuple(joints), tuple(stains))
+    return long_and_thin(kept, SEED, least_px), joints, stains
 
 
 def baselines(raster: Raster, peaks: Peaks) -> list[tuple[str, BitMask]]:
