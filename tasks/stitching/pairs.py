@@ -95,7 +95,8 @@ def _expected_in(features: PhotoFeatures, own: Prior, other: Prior) -> tuple[npt
 
 
 def _spread(matches: Matches, xy: npt.NDArray[np.float32]) -> Matches:
-    """At most ENOUGH, the first of each cell of the overlap before the second of any."""
+    """At most ENOUGH, the first of each cell of the overlap before the second of any; of a point with two
+    directions, so with two features, the second last of all."""
     if len(matches) <= ENOUGH:
         return matches
     points = xy[matches[:, 0]]
@@ -104,4 +105,6 @@ def _spread(matches: Matches, xy: npt.NDArray[np.float32]) -> Matches:
     by_cell = np.argsort(cell, kind="stable")
     rank = np.empty(len(matches), int)
     rank[by_cell] = np.arange(len(matches)) - np.searchsorted(cell[by_cell], cell[by_cell])
+    _, first = np.unique(points, axis=0, return_index=True)
+    rank[np.setdiff1d(np.arange(len(matches)), first)] += len(matches)
     return matches[np.sort(np.argsort(rank, kind="stable")[:ENOUGH])]

@@ -21,6 +21,7 @@ LEAST_KEPT = 0.4  # nor one most of whose points the adjustment threw out
 LARGEST_SCALE = 5.0  # against the median photo: beyond, it has shrunk to nothing or flown away
 LARGEST_MEDIAN_PX = 3.0  # per 2 MP photo; more is a photo in a wrong place, less may be trees on the ground
 ATTEMPTS = 4
+SPARING = 2  # of them, in which of neighbours only the loosest goes: without it the others may hold
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def solve(
     """Views of all photos that the matches hold together, on the relief where one is given and fits."""
     matched = match_pairs(pairs, features, frame.priors, ransac_px, lambda f: on_progress(0.6 * f))
     edges = matched
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
         guess = average(edges, features, frame.priors, frame.sigma_bias)
         held = _anchored(guess, frame)
         edges = [e for e in guess.edges if e.a in held and e.b in held]
@@ -68,6 +69,8 @@ def solve(
 
         adjusted = adjusted_from(guess.views)
         loose = _loose(observations, adjusted)
+        if attempt < SPARING:
+            loose = _loosest(loose, edges, observations, adjusted)
         loose |= elsewhere(
             guess.component, set(map(int, np.unique(observations.photo))), adjusted.views, frame, features
         )
@@ -115,6 +118,19 @@ def _loose(observations: Observations, adjusted: Adjusted) -> set[int]:
     scale = np.log([v.units_per_px for v in adjusted.views])
     odd = np.abs(scale - np.median(scale[before > 0])) > np.log(LARGEST_SCALE)
     return {int(i) for i in np.flatnonzero((bad | behind | odd) & (before > 0))}
+
+
+def _loosest(
+    loose: set[int], edges: Sequence[Edge], observations: Observations, adjusted: Adjusted
+) -> set[int]:
+    """Those of them with no neighbour among them of whose points less were kept."""
+    before, after = (
+        np.bincount(seen.photo, minlength=len(adjusted.views))
+        for seen in (observations, adjusted.observations)
+    )
+    kept = after / np.maximum(before, 1)
+    tied = [(e.a, e.b) for e in edges if e.a in loose and e.b in loose]
+    return loose - {a if kept[a] > kept[b] else b for a, b in tied if kept[a] != kept[b]}
 
 
 def _solved(adjusted: Adjusted, matched: Sequence[Edge], held: Sequence[Edge]) -> Solved:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from schemas.camera import Camera
+from tasks.stitching import pairs
 from tasks.stitching.averaging import average
 from tasks.stitching.matching import match, match_guided
 from tasks.stitching.pairs import Edge, PhotoFeatures
@@ -143,3 +144,15 @@ def test_a_track_that_claims_two_places_of_a_photo_is_dropped() -> None:
     assert found.tracks == 1
     assert found.photo.tolist() == [0, 1, 2]
     assert (found.xy == [500, 50]).all()
+
+
+def test_of_a_point_with_two_directions_the_second_match_comes_last() -> None:
+    """130 points, of which 40 are there twice: all 120 that are taken are of different points."""
+    rng = np.random.default_rng(5)
+    xy = rng.uniform(0, 1000, (130, 2)).astype(np.float32)
+    twice = np.concatenate([xy, xy[:40]])
+    order = rng.permutation(len(twice))
+    matches = np.column_stack([order, order]).astype(np.int64)
+    taken = pairs._spread(matches, twice)
+    assert len(taken) == pairs.ENOUGH
+    assert len(np.unique(twice[taken[:, 0]], axis=0)) == pairs.ENOUGH
