@@ -30,6 +30,15 @@ class Components(NamedTuple):
         return self.extent_px**2 / np.maximum(self.area_px, 1.0)
 
     @property
+    def width_px(self) -> npt.NDArray[np.float64]:
+        """Mean length of the runs of pixels along rows, or along columns where these are shorter."""
+        y, x = self.pixels.y, self.pixels.x
+        turned = np.lexsort((y, x))
+        rows = np.bincount(self.label[_begins(y, x)], minlength=len(self.area_px))
+        columns = np.bincount(self.label[turned][_begins(x[turned], y[turned])], minlength=len(self.area_px))
+        return np.asarray(self.area_px / np.maximum(np.maximum(rows, columns), 1))
+
+    @property
     def thin(self) -> npt.NDArray[np.bool_]:
         """Which are as thin as cracks. Of what runs through the image from side to side, seen from near,
         nobody sees how long it is: there less is enough."""
@@ -49,6 +58,13 @@ class Components(NamedTuple):
     def keep(self, which: npt.NDArray[np.bool_]) -> Marked:
         """The pixels of the components chosen."""
         return self.pixels.where(which[self.label])
+
+
+def _begins(line: Indices, at: Indices) -> npt.NDArray[np.bool_]:
+    """Which pixels, line by line, begin a run."""
+    begins = np.ones(len(line), dtype=bool)
+    begins[1:] = (np.diff(line) != 0) | (np.diff(at) != 1)
+    return begins
 
 
 def components(pixels: Marked, reach_px: int = 0) -> Components:

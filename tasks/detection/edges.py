@@ -30,20 +30,20 @@ def without_soft(pixels: Marked, raster: Raster, dark: BitMask) -> tuple[Marked,
     sharp = np.ones(len(found.area_px), dtype=bool)
     order = np.argsort(found.label, kind="stable")
     ends = np.cumsum(found.area_px).astype(np.intp)
-    soft_at = []
+    soft_at, width_px = [], found.width_px
     for label in range(1, len(sharp)):
         index = order[ends[label - 1] : ends[label]]
-        if not _is_sharp(pixels.y[index], pixels.x[index], raster, dark):
+        if not _is_sharp(pixels.y[index], pixels.x[index], width_px[label], raster, dark):
             sharp[label] = False
             x, y, width, height = found.box(label)
             soft_at.append((x + width / 2, y + height / 2))
     return found.keep(sharp), soft_at
 
 
-def _is_sharp(y: Indices, x: Indices, raster: Raster, dark: BitMask) -> bool:
+def _is_sharp(y: Indices, x: Indices, width_px: float, raster: Raster, dark: BitMask) -> bool:
     """Of the component that has these pixels, row by row."""
     core, beside, further = [], [], []
-    reach = min(max(1.0, _width_px(y, x) / NARROW_PX), WIDEST)
+    reach = min(max(1.0, width_px / NARROW_PX), WIDEST)
     for inside, surface, grey, own in _tiles(y, x, raster, dark, int(reach * FURTHER_PX[1]) + 1):
         core.append(grey[inside & own])
         away = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5) / reach
@@ -54,14 +54,6 @@ def _is_sharp(y: Indices, x: Indices, raster: Raster, dark: BitMask) -> bool:
         return True
     darkness = float(np.median(np.concatenate(core)))
     return float(near.mean()) - darkness >= SHARP * (float(far.mean()) - darkness)
-
-
-def _width_px(y: Indices, x: Indices) -> float:
-    """Mean length of the runs of pixels along rows, or along columns where these are shorter."""
-    turned = np.lexsort((y, x))
-    rows = np.count_nonzero((np.diff(y) != 0) | (np.diff(x) != 1))
-    columns = np.count_nonzero((np.diff(x[turned]) != 0) | (np.diff(y[turned]) != 1))
-    return len(y) / (max(rows, columns) + 1)
 
 
 def _tiles(

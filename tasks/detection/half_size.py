@@ -9,7 +9,7 @@ import numpy.typing as npt
 from schemas.bit_mask import BitMask
 from schemas.raster import Pixels, Raster
 from tasks.connected import Marked
-from tasks.detection.components import Components, components
+from tasks.detection.components import components
 
 WIDE_PX = 6.5  # what is as wide as this is seen at half the size; thinner things may not be
 SEEN = 0.2  # share of its pixels
@@ -47,20 +47,4 @@ def seen_at_half_size(pixels: Marked, half: BitMask) -> Marked:
             x = np.clip(pixels.x // 2 + right, 0, half.width_px - 1)
             seen |= half.at(y, x)
     share = np.bincount(found.label[seen], minlength=len(found.area_px)) / np.maximum(found.area_px, 1.0)
-    return found.keep((share >= SEEN) | (_width_px(found) < WIDE_PX))
-
-
-def _width_px(found: Components) -> npt.NDArray[np.float64]:
-    """By label: mean length of the runs of pixels along rows, or along columns where these are shorter."""
-    y, x, label = found.pixels.y, found.pixels.x, found.label
-    turned = np.lexsort((y, x))
-    rows = np.bincount(label[_begins(y, x)], minlength=len(found.area_px))
-    columns = np.bincount(label[turned][_begins(x[turned], y[turned])], minlength=len(found.area_px))
-    return np.asarray(found.area_px / np.maximum(np.maximum(rows, columns), 1))
-
-
-def _begins(line: npt.NDArray[np.int32], at: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
-    """Which pixels, line by line, begin a run."""
-    begins = np.ones(len(line), dtype=bool)
-    begins[1:] = (np.diff(line) != 0) | (np.diff(at) != 1)
-    return begins
+    return found.keep((share >= SEEN) | (found.width_px < WIDE_PX))
