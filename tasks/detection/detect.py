@@ -112,9 +112,13 @@ def _ridge(
     on_progress: Progress | None,
 ) -> DetectionArrays:
     """What stands out at full size; what of it is wide, at half of it too."""
-    kept, joints, stains = _ridges(raster, settings, scale, least_px, on_progress)
-    if min(raster.height_px, raster.width_px) > 2 * scale.window:  # a quarter of the work
-        half, _, _ = _ridges(HalfSize(raster), settings, scale, least_px / 2, None)
+    told = on_progress or (lambda _: None)
+    twice = min(raster.height_px, raster.width_px) > 2 * scale.window
+    share = 0.8 if twice else 1.0  # of the work
+    kept, joints, stains = _ridges(raster, settings, scale, least_px, lambda f: told(share * f))
+    if twice:
+        smaller = HalfSize(raster)
+        half, _, _ = _ridges(smaller, settings, scale, least_px / 2, lambda f: told(0.8 + 0.2 * f))
         kept = seen_at_half_size(kept, half.mask)
     return DetectionArrays(kept.mask, count_valid(raster), tuple(joints), tuple(stains))
 
@@ -124,7 +128,7 @@ def _ridges(
     settings: DetectSettings,
     scale: Scale,
     least_px: float,
-    on_progress: Progress | None,
+    on_progress: Progress,
 ) -> tuple[Marked, list[Joint], list[tuple[float, float]]]:
     def dark_in(window: Window, seen: Window) -> Part:
         levels = dark_levels(grey_of(raster.rgb(*seen)), raster.valid(*seen), scale, settings.k, settings.R)

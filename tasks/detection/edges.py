@@ -14,9 +14,9 @@ from tasks.detection.components import components
 from tasks.detection.sauvola import Grey, Mask, grey_of
 
 BESIDE_PX = (3.0, 6.0)  # distances from the component's rim that count as right beside it
-FURTHER_PX = (10.0, 16.0)  # and as further away; both in proportion beside what is wider than
-NARROW_PX = 12.0  # since wide cracks are seen at a smaller size, from nearer and less sharp
-WIDEST = 4.0  # times as wide: further away all sorts of things lie
+FURTHER_PX = (10.0, 16.0)  # and as further away
+NARROW_PX = 12.0  # what is wider is seen from nearer, and less sharp: both in proportion, as far as
+WIDEST = 4.0  # times as far; beyond, all sorts of things lie
 SHARP = 0.7  # least share of the contrast that is reached right beside it; of 99 in 100 real cracks .78 is
 ENOUGH_PX = 10  # pixels that a ring must have to be judged by
 TILE_PX = 1024  # of a component that are looked at together

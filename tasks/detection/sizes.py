@@ -38,16 +38,18 @@ class Answer(NamedTuple):
     left_px: int
     octave: int
 
-    def within(self, window: Window) -> "Answer":
-        """Its part in a window; of an answer at full size."""
-        rows = slice(window.top - self.top_px, window.bottom - self.top_px)
-        columns = slice(window.left - self.left_px, window.right - self.left_px)
-        return Answer(self.alone[rows, columns], self.joined[rows, columns], window.top, window.left, 0)
+    @property
+    def window(self) -> Window:
+        """Where it lies, at its size."""
+        top, left = self.top_px >> self.octave, self.left_px >> self.octave
+        height, width = self.alone.shape
+        return Window(top, top + height, left, left + width)
 
-    def rows(self, top: int, bottom: int) -> "Answer":
-        """Its part from row `top` to row `bottom`, of its own."""
-        at_px = self.top_px + (top << self.octave)
-        return self._replace(alone=self.alone[top:bottom], joined=self.joined[top:bottom], top_px=at_px)
+    def within(self, window: Window) -> "Answer":
+        """Its part in a window, at its size."""
+        part = window.inside(self.window)
+        top_px, left_px = window.top << self.octave, window.left << self.octave
+        return Answer(self.alone[part], self.joined[part], top_px, left_px, self.octave)
 
     def compact(self) -> "Answer":
         """In half the memory: off by less than a thousandth of a probability."""
@@ -71,10 +73,8 @@ class Answer(NamedTuple):
 
     def _enlarged(self, finer: "Answer", part: Callable[[slice, slice], Kept]) -> Logits:
         step = 1 << (self.octave - finer.octave)
-        top, left = (
-            (finer.top_px - self.top_px) >> finer.octave,
-            (finer.left_px - self.left_px) >> finer.octave,
-        )
+        top = finer.window.top - (self.top_px >> finer.octave)
+        left = finer.window.left - (self.left_px >> finer.octave)
         height, width = finer.alone.shape
         y, x = max(0, top // step - 1), max(0, left // step - 1)  # one more on each side, to lie between
         small = part(slice(y, -(-(top + height) // step) + 1), slice(x, -(-(left + width) // step) + 1))
@@ -88,12 +88,11 @@ def join(alone: Answer, wider: tuple[Answer, ...]) -> Answer:
     """An answer with those of smaller sizes around it, the smallest first."""
     if not wider:
         return alone
-    joined = np.empty(alone.alone.shape, np.float32)
-    height = len(joined)
-    for top in range(0, height, BAND_ROWS):
-        bottom = min(height, top + BAND_ROWS)
-        first, last = max(0, top - MARGIN_PX), min(height, bottom + MARGIN_PX)
-        joined[top:bottom] = _joined(alone.rows(first, last), wider)[top - first : bottom - first]
+    joined, whole = np.empty(alone.alone.shape, np.float32), alone.window
+    for top in range(whole.top, whole.bottom, BAND_ROWS):
+        band = whole._replace(top=top, bottom=min(whole.bottom, top + BAND_ROWS))
+        seen = band.grown(MARGIN_PX, whole)
+        joined[band.inside(whole)] = _joined(alone.within(seen), wider)[band.inside(seen)]
     return alone._replace(joined=joined)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,15 +14,15 @@ from tasks.stitching.pairs import Edge, PhotoFeatures, match_pairs
 from tasks.stitching.placement import elsewhere
 from tasks.stitching.prior import PlaneFrame
 from tasks.stitching.relief import HeightMap
-from tasks.stitching.tracks import Observations, build_tracks
+from tasks.stitching.tracks import Index, Observations, build_tracks
 from tasks.stitching.view import Array, View
 
 LEAST_OBSERVATIONS = 12  # a photo with fewer points left is not held by them
 LEAST_KEPT = 0.4  # nor one most of whose points the adjustment threw out
 LARGEST_SCALE = 5.0  # against the median photo: beyond, it has shrunk to nothing or flown away
 LARGEST_MEDIAN_PX = 3.0  # per 2 MP photo; more is a photo in a wrong place, less may be trees on the ground
-ATTEMPTS = 4
-SPARING = 2  # of them, in which of neighbours only the loosest goes: without it the others may hold
+SPARING = 2  # first attempts, in which of neighbours only the loosest goes: without it the others may hold
+ATTEMPTS = SPARING + 4
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,10 @@ def solve(
             )
 
         adjusted = adjusted_from(guess.views)
-        loose = _loose(observations, adjusted)
+        kept = _kept(observations, adjusted)
+        loose = _loose(kept, adjusted)
         if attempt < SPARING:
-            loose = _loosest(loose, edges, observations, adjusted)
+            loose = _loosest(loose, kept, edges)
         loose |= elsewhere(
             guess.component, set(map(int, np.unique(observations.photo))), adjusted.views, frame, features
         )
@@ -102,12 +104,23 @@ def _anchored(guess: Guess, frame: PlaneFrame) -> set[int]:
     return held
 
 
-def _loose(observations: Observations, adjusted: Adjusted) -> set[int]:
+class _Kept(NamedTuple):
+    """Points of each photo, before the adjustment threw some out and after."""
+
+    before: Index
+    after: Index
+
+
+def _kept(observations: Observations, adjusted: Adjusted) -> _Kept:
+    photos = len(adjusted.views)
+    before, after = (np.bincount(o.photo, minlength=photos) for o in (observations, adjusted.observations))
+    return _Kept(before, after)
+
+
+def _loose(kept: _Kept, adjusted: Adjusted) -> set[int]:
     """Photos that the adjustment could not hold: too few points, most thrown out, most residuals large (a
     few are wherever something stands out of the plane), or a scale that has run away."""
-    photos = len(adjusted.views)
-    before = np.bincount(observations.photo, minlength=photos)
-    after = np.bincount(adjusted.observations.photo, minlength=photos)
+    before, after = kept
     lengths = np.linalg.norm(adjusted.residual_px, axis=1)
     usual = np.array([np.median(lengths[adjusted.observations.photo == i]) for i in np.flatnonzero(after)])
     size = np.array([v.camera.width_px * v.camera.height_px for v in adjusted.views])
@@ -120,17 +133,11 @@ def _loose(observations: Observations, adjusted: Adjusted) -> set[int]:
     return {int(i) for i in np.flatnonzero((bad | behind | odd) & (before > 0))}
 
 
-def _loosest(
-    loose: set[int], edges: Sequence[Edge], observations: Observations, adjusted: Adjusted
-) -> set[int]:
+def _loosest(loose: set[int], kept: _Kept, edges: Sequence[Edge]) -> set[int]:
     """Those of them with no neighbour among them of whose points less were kept."""
-    before, after = (
-        np.bincount(seen.photo, minlength=len(adjusted.views))
-        for seen in (observations, adjusted.observations)
-    )
-    kept = after / np.maximum(before, 1)
+    share = kept.after / np.maximum(kept.before, 1)
     tied = [(e.a, e.b) for e in edges if e.a in loose and e.b in loose]
-    return loose - {a if kept[a] > kept[b] else b for a, b in tied if kept[a] != kept[b]}
+    return loose - {a if share[a] > share[b] else b for a, b in tied if share[a] != share[b]}
 
 
 def _solved(adjusted: Adjusted, matched: Sequence[Edge], held: Sequence[Edge]) -> Solved:

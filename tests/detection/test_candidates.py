@@ -63,6 +63,18 @@ def test_stronger_is_likelier() -> None:
     assert 0.0 < faint < strong < 1.0
 
 
+def test_of_two_as_strong_and_as_bent_the_slender_one_is_likelier() -> None:
+    stubby, slender = (
+        features(components(likely(line((200,), 12)))),
+        features(components(likely(line((200,))))),
+    )
+    assert stubby[1, 3] == pytest.approx(np.log((12**2 + 1) / 12))
+    assert slender[1, 3] == pytest.approx(np.log((60**2 + 1) / 60))
+    alike = np.repeat(slender[1:2], 2, axis=0)
+    alike[0, 3] = stubby[1, 3]
+    assert np.diff(judged.score_of(alike))[0] > 0.02
+
+
 def test_bend_is_least_for_a_ruled_line_and_none_for_a_ring() -> None:
     p = np.zeros((200, 300), np.uint8)
     cv2.line(p, (10, 20), (290, 60), 250, 3)

@@ -2,9 +2,11 @@ import cv2
 import numpy as np
 import pytest
 
+from schemas.bit_mask import BitMask
 from schemas.detection import Peaks
 from schemas.raster import ArrayRaster
 from schemas.settings import DetectSettings
+from tasks.connected import Marked
 from tasks.detection import windows
 from tasks.detection.detect import baselines, detect_image, detect_raster
 from tests.measurement.drawn_crack import drawn_crack
@@ -57,6 +59,24 @@ def test_finds_a_crack_and_nothing_else(width: int, depth: float) -> None:
     found = detect_image(rgb, None, RIDGE, 1.0).mask
     assert found_share(found, truth) > 0.9
     assert false_px(found, truth) == 0
+
+
+def test_ridge_asks_half_the_size_about_what_it_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    rgb = rough(301, 700, contrast=0.03)
+    truth = with_crack(rgb, 150, 8, 0.35, 60, 640)
+    asked = []
+
+    def none_of_it(pixels: Marked, half: BitMask) -> Marked:
+        asked.append((pixels.mask.whole(), half.whole()))
+        return pixels.where(np.zeros(len(pixels.y), dtype=bool))
+
+    monkeypatch.setattr("tasks.detection.detect.seen_at_half_size", none_of_it)
+    told: list[float] = []
+    found = detect_raster(ArrayRaster(rgb), RIDGE, 1.0, Peaks(), told.append)
+    ((full, half),) = asked
+    assert not found.mask.any() and found_share(full, truth) > 0.9
+    assert half.shape == (150, 350) and found_share(half, truth[:300:2, ::2]) > 0.9
+    assert told == sorted(told) and told[-1] == 1.0
 
 
 def test_rough_concrete_without_cracks_is_left_alone() -> None:

@@ -1,5 +1,6 @@
 import cv2
 import numpy as np
+import pytest
 
 from tasks.detection import sizes
 from tasks.detection.sizes import Answer, Logits, join
@@ -52,6 +53,20 @@ def test_a_smaller_answer_is_enlarged_to_where_a_finer_one_lies() -> None:
 
 def test_an_answer_within_a_window_is_the_part_of_it_there() -> None:
     logit = np.arange(400, dtype=np.float32).reshape(20, 20)
-    part = Answer(logit, logit + 1, 100, 200, 0).within(Window(105, 110, 203, 220))
+    part = Answer(logit, logit + 1, 100, 200, 1).within(Window(55, 60, 103, 120))
     assert (part.alone == logit[5:10, 3:20]).all() and (part.joined == logit[5:10, 3:20] + 1).all()
-    assert (part.top_px, part.left_px) == (105, 203)
+    assert (part.top_px, part.left_px, part.octave) == (110, 206, 1)
+
+
+def test_bands_are_joined_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    full, half, quarter = (
+        cv2.GaussianBlur(rng.normal(0, 40, (side, side)).astype(np.float32), (0, 0), 4.0)
+        for side in (256, 128, 64)
+    )
+    wider = (of(quarter, 2), of(half, 1))
+    joined = []
+    for rows in (sizes.BAND_ROWS, 32):
+        monkeypatch.setattr(sizes, "BAND_ROWS", rows)
+        joined.append(join(of(full, 0), wider).joined)
+    assert (joined[0] == joined[1]).all() and (joined[0] != full).mean() > 0.1

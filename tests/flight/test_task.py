@@ -33,6 +33,10 @@ from tests.flight.wall_plan import wall_plan
 PLAN = wall_plan(4, 2)
 
 
+def full(*_: Any) -> None:
+    raise OSError(28, "No space left")
+
+
 @pytest.fixture(scope="module")
 def vehicle() -> Iterator[str]:
     with start_vehicle(PLAN, 3) as url:
@@ -192,9 +196,6 @@ def test_a_disk_that_is_nearly_full_is_told_before_the_vehicle_is_asked(
 def test_an_archive_that_cannot_be_opened_leaves_the_vehicle_as_it_was(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def full(*_: Any) -> None:
-        raise OSError(28, "No space left")
-
     monkeypatch.setattr("tasks.flight.task.FlightArchive", full)
     plan = PLAN.model_copy(update={"return_height_m": 8.5})
     with start_vehicle(plan, 1) as url:
@@ -209,24 +210,18 @@ def test_an_archive_that_cannot_be_opened_leaves_the_vehicle_as_it_was(
 def test_a_disk_that_fills_before_take_off_leaves_the_vehicle_on_the_ground(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def full(*_: Any) -> None:
-        raise OSError(28, "No space left")
-
     monkeypatch.setattr("tasks.flight.fly.archive", full)
     with start_vehicle(PLAN, 1) as url:
         with pytest.raises(BadInput, match=r"cannot be archived \(No space left\)"):
             fly.bare(PLAN, "1", url, 5.0)
         with Link(url, 5.0) as link:
-            link.find_vehicle()
+            assert not link.find_vehicle().base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
             assert read_back(link) == ()
 
 
 def test_a_disk_that_fills_after_landing_costs_the_end_of_the_archive(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def full(_: Any) -> None:
-        raise OSError(28, "No space left")
-
     told: list[str] = []
     monkeypatch.setattr("mcap.writer.Writer.finish", full)
     monkeypatch.setattr("tasks.flight.task.note", told.append)

@@ -1,0 +1,24 @@
+"""Real photos of a wall that is not quite plane, without any position."""
+
+from artifacts import store
+from schemas.settings import StitchSettings
+from tasks.photos.task import features, ingest
+from tasks.stitching.task import stitch
+from tests.development_data import development_data
+
+STANDS_OUT = "slide881.png"
+
+
+def test_a_photo_of_what_stands_out_of_a_wall_takes_no_other_with_it() -> None:
+    """Of its neighbour hardly more points are kept, until it is left out."""
+    folder = development_data("cracks/uav")
+    rows = (row.split() for row in (folder / "groups.txt").read_text().splitlines())
+    names = sorted(name for name, group in rows if group == "2")
+    settings = StitchSettings()
+    photos = tuple(
+        ingest.bare(store.current().put(folder / "images" / name), name, "wall", None, None, 5.0)
+        for name in names
+    )
+    mosaic = stitch.bare("wall", None, photos, tuple(features.bare(p, settings) for p in photos), settings)
+    assert len(names) == 10
+    assert [p.name for p in mosaic.placements if p.status != "solved"] == [STANDS_OUT]
