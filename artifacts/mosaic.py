@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -177,8 +178,20 @@ class TiledTiff:
 
 def _packed(tile: npt.NDArray[Any]) -> bytes:
     """Of colours the steps along each row (TIFF's horizontal predictor): a sixth less of a photo."""
-    steps = imagecodecs.delta_encode(tile, axis=1) if tile.ndim == 3 else tile
-    return bytes(imagecodecs.deflate_encode(steps.tobytes(), LEVEL))
+    if tile.ndim == 3:
+        return _deflated(imagecodecs.delta_encode(tile, axis=1).tobytes())
+    first = tile[:1, :1]
+    alike = bool((tile == first).all())  # as most tiles of coverage and of sources are
+    return _deflated_alike(first.tobytes(), tile.size) if alike else _deflated(tile.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _deflated_alike(value: bytes, count: int) -> bytes:
+    return _deflated(value * count)
+
+
+def _deflated(data: bytes) -> bytes:
+    return bytes(imagecodecs.deflate_encode(data, LEVEL))
 
 
 class MosaicWriter:

@@ -36,7 +36,8 @@ from tasks.stitching.view import Array, View
 # first, since narrow ones freeze whatever the first guess got wrong; SIFT is not better than the last.
 LEAST_SIGMA_PX = (2.0, 0.5, 0.1)
 ITERATIONS = 40
-CONVERGED = 0.01  # fall of the cost: a hundredth of what one sigma of one unknown costs
+# Fall of the cost, where one sigma of one unknown costs 1: the last round's answer counts, the others' guess.
+CONVERGED = (1.0, 1.0, 0.1)
 LEAST_DAMPING = 1e-11  # more would hold back what the photos all share, which they hardly tell
 ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens) until residuals tell
 CAUCHY = 2.5  # residuals of this many sigma count half
@@ -81,11 +82,11 @@ def adjust(
     sigma, residual, variance = 0.0, np.zeros((0, 2)), ALIKE * LEAST_SIGMA_PX[0] ** 2
     sigma_roll = np.full(2, LARGEST_ROLL * max(c.height_px for c in cameras))
     expected = np.zeros_like(state.roll)
-    for round_, least_sigma in enumerate(LEAST_SIGMA_PX):
+    for round_, (least_sigma, converged) in enumerate(zip(LEAST_SIGMA_PX, CONVERGED, strict=True)):
         sigmas = [focal_sigmas[i] for i in seen]
         bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll, expected)
         state = replace(state, X=points(state, bundle))
-        state, residual, sigma = _iterate(state, bundle, least_sigma, variance)
+        state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
         weight, trust = _robust(residual, sigma), _trust(state, bundle)
         variance = noise(bundle, residual, weight)
         on_progress((round_ + 1) / len(LEAST_SIGMA_PX))
@@ -112,7 +113,7 @@ def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) 
     hang on noise: in photos that are all upright a shutter's pull is a stretch of the whole."""
     stiff = replace(bundle, sigma_roll=NO_ROLL)
     start = replace(state, roll=np.zeros_like(state.roll))
-    without, residual, _ = _iterate(start, stiff, least_sigma, variance)
+    without, residual, _ = _iterate(start, stiff, least_sigma, variance, CONVERGED[-1])
     sigma = max(_sigma(residual), least_sigma)
     saved = _cost(without, stiff, residual, sigma, variance) - _cost(
         state, bundle, residuals(state, bundle), sigma, variance
@@ -120,7 +121,9 @@ def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) 
     return bool(saved > np.log(len(residual)) * state.roll.size)
 
 
-def _iterate(state: State, bundle: Bundle, least_sigma: float, variance: float) -> tuple[State, Array, float]:
+def _iterate(
+    state: State, bundle: Bundle, least_sigma: float, variance: float, converged: float
+) -> tuple[State, Array, float]:
     """To the minimum; residuals (M, 2) and their robust sigma there. variance: of a coordinate of a fully
     trusted observation, as if all were independent (px²)."""
     damping = 1e-4
@@ -140,7 +143,7 @@ def _iterate(state: State, bundle: Bundle, least_sigma: float, variance: float) 
             break
         state, damping = candidate, max(damping / 10.0, LEAST_DAMPING)
         residual, jacobians = linearise(state, bundle)
-        if cost - new_cost < CONVERGED and damping <= LEAST_DAMPING:
+        if cost - new_cost < converged and damping <= LEAST_DAMPING:
             break
     return state, residual, max(_sigma(residual), least_sigma)
 

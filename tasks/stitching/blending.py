@@ -17,10 +17,12 @@ REACH = 4 * ALIGN  # no pixel farther than this from another has a say in it
 
 
 class MultiBand:
-    """Blends layers into one window; the window's corner and size are multiples of ALIGN."""
+    """Blends layers into one window, of which all is shown but a rim; the window's corner and size are
+    multiples of ALIGN, the rim is even, 4 px or more."""
 
-    def __init__(self, width: int, height: int) -> None:
-        self._finest = np.zeros((height, width, 3), np.float32)
+    def __init__(self, width: int, height: int, rim: int) -> None:
+        self._rim = rim
+        self._finest = np.zeros((height - 2 * rim, width - 2 * rim, 3), np.float32)
         sizes = [(height >> k, width >> k) for k in range(1, BANDS + 1)]
         self._sum = [np.zeros((*size, 3), np.float32) for size in sizes]
         self._weight = [np.zeros(size, np.float32) for size in sizes]
@@ -40,17 +42,23 @@ class MultiBand:
 
     def add_finest(self, layer: Layer, half: Layer, mask: Mask, x: int, y: int) -> None:
         """`layer` and `mask` (h, w): where it is wanted alone; `half` (h / 2 + 4, w / 2 + 4, 3) goes two of
-        its pixels further on each side. Corner and size are even."""
+        its pixels further on each side. Corner, counted from where the rim ends, and size are even."""
         coarse = np.asarray(cv2.pyrUp(half), np.float32)[4:-4, 4:-4]
         _set(self._finest[y : y + mask.shape[0], x : x + mask.shape[1]], layer, coarse, mask)
 
     def result(self) -> npt.NDArray[np.uint8]:
-        """(H, W, 3); nothing of use where no layer was wanted. To be asked once."""
+        """(H, W, 3) inside the rim; nothing of use where no layer was wanted. To be asked once."""
         image = np.zeros_like(self._sum[-1])
-        for total, weight in zip(self._sum[::-1], self._weight[::-1], strict=True):
+        for total, weight in zip(self._sum[:0:-1], self._weight[:0:-1], strict=True):
             _collapse(total, weight, image)
             image = np.asarray(cv2.pyrUp(total), np.float32)
-        return np.asarray(_levels(self._finest, image), np.uint8)
+        cut = self._rim // 2 - 2
+        inner = (slice(cut, image.shape[0] - cut), slice(cut, image.shape[1] - cut))
+        shown = np.ascontiguousarray(self._sum[0][inner])
+        _collapse(shown, self._weight[0][inner], image[inner])
+        return np.asarray(
+            _levels(self._finest, np.asarray(cv2.pyrUp(shown), np.float32)[4:-4, 4:-4]), np.uint8
+        )
 
 
 @numba.njit(cache=True, nogil=True)

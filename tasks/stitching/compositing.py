@@ -155,9 +155,8 @@ def _tile(
     # The window reaches beyond the tile by what blending sees, beyond the canvas too.
     wx, wy, side = x - REACH, y - REACH, TILE_PX + 2 * REACH
     label = label_window([s.view for s in sources], worth, canvas, parted, wx, wy, side, side)
-    inner = (slice(REACH, REACH + height), slice(REACH, REACH + width))
-    own = label[inner]
-    blend, alone = MultiBand(side, side), dict(_boxes(own))
+    own = label[REACH : REACH + height, REACH : REACH + width]
+    blend, alone = MultiBand(side, side, REACH), dict(_boxes(own))
     coarse = replace(canvas, gsd=2.0 * canvas.gsd)  # whose pixels are every second of the canvas's
     for i, box in _boxes(label):
         source, pixels = sources[i], read(i)
@@ -166,15 +165,22 @@ def _tile(
         half = source.layer(pixels.half, coarse, source.half, left, top, (x1 - x0) // 2, (y1 - y0) // 2)
         blend.add(half, (label[y0:y1, x0:x1] == i).astype(np.float32), x0, y0)
         if i in alone:
-            a0, a1, b0, b1 = (n + REACH for n in _aligned(alone[i]))
-            layer = source.layer(pixels.full, canvas, source.view, wx + a0, wy + b0, a1 - a0, b1 - b0)
-            around = half[(b0 - y0) // 2 - 2 : (b1 - y0) // 2 + 2, (a0 - x0) // 2 - 2 : (a1 - x0) // 2 + 2]
-            blend.add_finest(layer, around, label[b0:b1, a0:a1] == i, a0, b0)
+            a0, a1, b0, b1 = _aligned(alone[i])
+            layer = source.layer(pixels.full, canvas, source.view, x + a0, y + b0, a1 - a0, b1 - b0)
+            rows, columns = slice(b0 + REACH, b1 + REACH), slice(a0 + REACH, a1 + REACH)
+            blend.add_finest(layer, _around(half, rows, columns, x0, y0), label[rows, columns] == i, a0, b0)
     covered = own >= 0
-    rgb = np.ascontiguousarray(blend.result()[inner])
+    rgb = np.ascontiguousarray(blend.result()[:height, :width])
     if not covered.all():
         rgb[~covered] = 0
     return Tile(x, y, rgb, np.where(covered, 255, 0).astype(np.uint8), (own + 1).astype(np.uint16))
+
+
+def _around(half: Floats, rows: slice, columns: slice, x0: int, y0: int) -> Floats:
+    """Of a layer at half its size, that starts at x0, y0 of the window, these and two pixels more."""
+    top, bottom = (rows.start - y0) // 2 - 2, (rows.stop - y0) // 2 + 2
+    left, right = (columns.start - x0) // 2 - 2, (columns.stop - x0) // 2 + 2
+    return half[top:bottom, left:right]
 
 
 def _boxes(label: Labels) -> Iterator[tuple[int, Box]]:
@@ -190,10 +196,14 @@ def _extents(label: Labels, photos: int) -> Labels:
     boxes = np.empty((photos, 4), np.int32)
     boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3] = label.shape[1], 0, label.shape[0], 0
     for y in range(label.shape[0]):
-        for x in range(label.shape[1]):
-            if label[y, x] >= 0:
-                box = boxes[label[y, x]]
-                box[0], box[1] = min(box[0], x), max(box[1], x + 1)
+        x = 0
+        while x < label.shape[1]:
+            own, first = label[y, x], x
+            while x < label.shape[1] and label[y, x] == own:
+                x += 1
+            if own >= 0:
+                box = boxes[own]
+                box[0], box[1] = min(box[0], first), max(box[1], x)
                 box[2], box[3] = min(box[2], y), max(box[3], y + 1)
     return boxes
 

@@ -7,6 +7,7 @@ from os import cpu_count
 
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 from tasks.stitching.matching import Descriptors, Matches, match, match_guided
 from tasks.stitching.prior import Prior
@@ -42,7 +43,9 @@ def match_pairs(
 ) -> list[Edge]:
     """The pairs that pass the paper's rule, in the order of `pairs`."""
     edges: list[Edge] = []
-    with ThreadPoolExecutor(max_workers=min(4, cpu_count() or 1)) as threads:
+    workers = min(4, cpu_count() or 1)
+    # Threads of the matrix products inside these would wait for one another, and burn as much time again.
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(workers) as threads:
         found = threads.map(lambda pair: _match_pair(pair, features, priors, ransac_px), pairs)
         for count, edge in enumerate(found, start=1):
             if edge is not None:

@@ -57,12 +57,13 @@ class Partition:
 
     def window(self, x0: int, y0: int, width: int, height: int) -> Labels:
         """(height, width) of pixels; NONE beyond the canvas."""
-        y = np.floor_divide(np.arange(y0, y0 + height), self.cell_px)
-        x = np.floor_divide(np.arange(x0, x0 + width), self.cell_px)
         rows, columns = self.label.shape
-        inside = ((y >= 0) & (y < rows))[:, None] & ((x >= 0) & (x < columns))[None]
-        cells = self.label[np.clip(y, 0, rows - 1)[:, None], np.clip(x, 0, columns - 1)[None]]
-        return np.asarray(np.where(inside, cells, np.int32(NONE)), np.int32)
+        y = np.clip(np.floor_divide(np.arange(y0, y0 + height), self.cell_px), -1, rows)
+        x = np.clip(np.floor_divide(np.arange(x0, x0 + width), self.cell_px), -1, columns)
+        cells = np.full((y[-1] - y[0] + 1, x[-1] - x[0] + 1), NONE, np.int32)
+        top, bottom, left, right = max(y[0], 0), min(y[-1] + 1, rows), max(x[0], 0), min(x[-1] + 1, columns)
+        cells[top - y[0] : bottom - y[0], left - x[0] : right - x[0]] = self.label[top:bottom, left:right]
+        return np.asarray(cells.take(y - y[0], axis=0).take(x - x[0], axis=1))
 
 
 def darkness(pixels: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:

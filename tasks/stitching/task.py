@@ -222,10 +222,10 @@ def _reader(photos: list[Photo]) -> Callable[[int], "Pixels"]:
     paths: list[Path] = [store.current().path(p.file) for p in photos]  # verified here, read from threads
 
     def read(index: int) -> "Pixels":
-        bgr = cv2.imread(str(paths[index]), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-        if bgr is None:
+        rgb = cv2.imread(str(paths[index]), cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+        if rgb is None:
             raise BadInput(photos[index].name, "cannot be read", "Copy it again from the camera's card")
-        return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB))
+        return np.asarray(rgb)
 
     return read
 
