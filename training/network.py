@@ -67,7 +67,10 @@ class Network(nn.Module):
         self.unfold = nn.Sequential(shape, nn.PixelShuffle(2))
 
     def forward(self, rgb: Tensor) -> Tensor:
-        y = self.fold(2.0 * rgb - 1.0)
+        return self.of_folded(self.fold(2.0 * rgb - 1.0))
+
+    def of_folded(self, y: Tensor) -> Tensor:
+        """What comes after the first layer."""
         levels = []
         for down in self.down:
             y = down(y)

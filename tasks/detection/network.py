@@ -25,9 +25,9 @@ from tasks.heap import given_back, reused
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
-SHA256 = "9c768a041ee0224d90dc2b443c311b236397e0262a24a2883a063aa18b3fda3f"
+SHA256 = "1c5fb9f5bf985e43fd7b810e9b747dc71ea6cbe585193a904924931065227907"
 STRIDE = 32
-SEEN_PX = 6_850_000  # at once, 120 bytes each (measured): half of a photo of 12 MP and its halo
+SEEN_PX = 6_850_000  # at once, 126 bytes each (measured): half of a photo of 12 MP and its halo
 HALO_PX = 224  # of an octave: what lies further away changes a probability by 1/255 at most (measured)
 STEP_PX = STRIDE << OCTAVES[0]  # windows begin at multiples of it: so do their pixels at each octave
 BAND_PX = 4 << 20  # pixels of an image that are read and reduced at once, unless it is wider than that
@@ -54,6 +54,12 @@ class Model(NamedTuple):
     name: str  # for messages
     at_smaller_sizes: bool = False  # ask it again at half size and less, where it sees wide cracks whole
     limits: Limits = USUAL_LIMITS
+    folded: bool = False  # takes pixels as `_folded` has them
+
+
+def as_trained(content: bytes, name: str) -> Model:
+    """A network as training.export writes it."""
+    return Model(content, name, at_smaller_sizes=True, limits=OUR_LIMITS, folded=True)
 
 
 def our_model() -> Model:
@@ -65,7 +71,7 @@ def our_model() -> Model:
         raise BadInput(OURS.name, f"cannot be read ({problem.strerror})", remedy) from None
     if hashlib.sha256(content).hexdigest() != SHA256:
         raise BadInput(OURS.name, "is not the network that this version ships: altered or cut short", remedy)
-    return Model(content, OURS.name, at_smaller_sizes=True, limits=OUR_LIMITS)
+    return as_trained(content, OURS.name)
 
 
 def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:
@@ -192,10 +198,12 @@ class _Net:
     def logits(self, rgb: Pixels) -> Logits:
         """(H, W) of (H, W, 3)."""
         height, width = rgb.shape[:2]
-        seen = cv2.copyMakeBorder(rgb, 0, -height % STRIDE, 0, -width % STRIDE, cv2.BORDER_REFLECT_101)
+        down, right = -height % STRIDE, -width % STRIDE
+        seen = np.asarray(cv2.copyMakeBorder(rgb, 0, down, 0, right, cv2.BORDER_REFLECT_101), np.uint8)
         rows, columns = seen.shape[:2]
+        pixels = _folded(seen) if self.model.folded else cv2.dnn.blobFromImage(seen, 1.0 / 255.0)
         try:
-            self.net.setInput(cv2.dnn.blobFromImage(seen, 1.0 / 255.0))
+            self.net.setInput(pixels)
             logit = np.asarray(self.net.forward(), dtype=np.float32)
         except cv2.error as problem:
             what = f"does not run on a tile of an image ({_first_words(problem)})"
@@ -212,6 +220,21 @@ def _read(model: Model) -> Any:
         return cv2.dnn.readNetFromONNX(np.frombuffer(model.content, dtype=np.uint8))
     except cv2.error as problem:
         raise _unfit(model, f"cannot be read as an ONNX network ({_first_words(problem)})") from None
+
+
+@njit(cache=True, nogil=True)
+def _folded(rgb: Pixels) -> npt.NDArray[np.float32]:
+    """(1, 12, H / 2 + 1, W / 2 + 1), −1..1, of (H, W, 3), even: a pixel of 0 around it, and each 2×2 of its
+    pixels as channels, as PyTorch's PixelUnshuffle has them."""
+    height, width = rgb.shape[0] // 2, rgb.shape[1] // 2
+    pixels = np.zeros((1, 12, height + 1, width + 1), np.float32)
+    for y in range(2 * height):
+        for x in range(2):
+            for c in range(3):
+                row = pixels[0, 4 * c + 2 * (1 - y % 2) + 1 - x, (y + 1) // 2, x:]
+                for k in range(width):
+                    row[k] = np.float32(rgb[y, 2 * k + x, c]) * np.float32(2.0 / 255.0) - np.float32(1.0)
+    return pixels
 
 
 @njit(cache=True, nogil=True)

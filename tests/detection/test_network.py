@@ -129,6 +129,14 @@ def test_windows_give_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> N
     assert np.abs(parts - whole).max() <= 6 and (np.abs(parts - whole) > 1).mean() < 1e-3
 
 
+def test_the_pixels_of_two_by_two_are_twelve_channels() -> None:
+    """As PyTorch's PixelUnshuffle has them of the photo in −1..1 with a pixel of 0 around it."""
+    rgb = np.random.default_rng(0).integers(0, 256, (4, 6, 3), np.uint8)
+    rim = np.pad(rgb.transpose(2, 0, 1) / 127.5 - 1.0, ((0, 0), (1, 1), (1, 1)))
+    unshuffled = rim.reshape(3, 3, 2, 4, 2).transpose(0, 2, 4, 1, 3).reshape(1, 12, 3, 4)
+    np.testing.assert_allclose(network._folded(rgb), unshuffled, atol=1e-6)
+
+
 def test_four_channels_are_the_pixels_of_two_by_two() -> None:
     """As ONNX's DepthToSpace and PyTorch's PixelShuffle have it."""
     four = np.arange(24, dtype=np.float32).reshape(4, 2, 3)
