@@ -40,6 +40,16 @@ def test_windows_in_any_order_make_one_picture(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.tif", "b.tif"]
 
 
+def test_tiles_of_one_value_and_nearly_so_come_out_as_they_were(tmp_path: Path) -> None:
+    """The same value in several tiles, another, and two that are alike but for their last row or column."""
+    picture = np.full((2 * TILE_PX, 2 * TILE_PX), 7, np.uint16)
+    picture[TILE_PX:, :TILE_PX] = 300
+    picture[-1, TILE_PX:], picture[:TILE_PX, -1] = 8, 9
+    with TiledTiff(tmp_path / "source.tif", 2 * TILE_PX, 2 * TILE_PX, 1, np.uint16, PLACE) as out:
+        out.put(0, 0, picture)
+    np.testing.assert_array_equal(tifffile.imread(tmp_path / "source.tif"), picture)
+
+
 def test_what_never_came_is_blank(tmp_path: Path) -> None:
     with MosaicWriter(tmp_path, 600, 600, None, (0.0, 0.0), "own plane") as out:
         lit = np.full((88, 88), 255, np.uint8)

@@ -2,10 +2,11 @@
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from schemas.camera import Camera
 from tasks.stitching.canvas import lay_out
-from tasks.stitching.seams import NONE, darkness, label_window, partition
+from tasks.stitching.seams import NONE, Partition, darkness, label_window, partition
 from tasks.stitching.view import FACING, View
 
 CAMERA = Camera(width_px=800, height_px=640, focal_px=800.0)
@@ -74,6 +75,17 @@ def test_a_crack_across_the_overlap_is_crossed_once() -> None:
     t = line(250, 200, 950, 430)
     on_crack = label[np.rint(t[:, 1]).astype(int), np.rint(t[:, 0]).astype(int)]
     assert np.count_nonzero(np.diff(on_crack)) == 1
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (24, 16), (-37, -5), (70, 40)])
+def test_a_window_has_the_labels_of_its_cells(corner: tuple[int, int]) -> None:
+    """On and beyond a partition of 80 × 48 pixels."""
+    label = np.arange(60, dtype=np.int32).reshape(6, 10)
+    whole = np.full((248, 280), NONE, np.int32)
+    whole[100:148, 100:180] = np.kron(label, np.ones((8, 8), np.int32))
+    x, y = corner
+    window = Partition(label, 8).window(x, y, 45, 30)
+    np.testing.assert_array_equal(window, whole[100 + y : 130 + y, 100 + x : 145 + x])
 
 
 def test_a_window_is_part_of_the_whole() -> None:
