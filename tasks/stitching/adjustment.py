@@ -93,9 +93,14 @@ def adjust(
         good = np.linalg.norm(residual, axis=1) < OUTLIER * sigma
         if round_ < len(LEAST_SIGMA_PX) - 1:
             current = current.where(good)
-        if round_ == len(LEAST_SIGMA_PX) - 2:  # once, before anything was held back: it would shrink further
+        if round_ == len(LEAST_SIGMA_PX) - 2:
             if _is_told(state, bundle, least_sigma, variance):
                 expected = expected_roll(state, bundle)
+                sigma_roll = learnt_roll(state, bundle, expected, weight / variance, trust)
+                # Again: free as they were, the photos' rolls took over what a slant of the whole does to each.
+                bundle = replace(bundle, sigma_roll=sigma_roll, expected_roll=expected)
+                state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
+                weight, trust = _robust(residual, sigma), _trust(state, bundle)
                 sigma_roll = learnt_roll(state, bundle, expected, weight / variance, trust)
             else:
                 sigma_roll, state = NO_ROLL, replace(state, roll=np.zeros_like(state.roll))
