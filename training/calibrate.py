@@ -19,7 +19,7 @@ import numpy.typing as npt
 from schemas.raster import ArrayRaster
 from tasks.connected import Marked
 from tasks.detection.candidates import STRONGEST, candidates, features
-from tasks.detection.network import OUR_LIMITS, Model, Probability, as_trained, probability
+from tasks.detection.network import OUR_LIMITS, Model, Probability, probability
 from training.cracks import DOUBTFUL
 from training.photos import by_fold
 
@@ -98,7 +98,7 @@ def judged(p: Probability, truth: Mask, least_px: float) -> tuple[Floats, Mask]:
 
 
 def main(model_path: Path, photos: Path, fold: int, folders: list[Path]) -> None:
-    model = as_trained(model_path.read_bytes(), model_path.name)
+    model = Model(model_path.read_bytes(), model_path.name, at_smaller_sizes=True)
     of_photos = list(held_out(model, photos, fold))
     of_surfaces = [pair for folder in folders for pair in unseen(model, folder)]
     slope, offset = fit_pixels(of_photos)

@@ -1,11 +1,13 @@
 """A crack's probability at every pixel, by a small network that OpenCV runs.
 
 Ours lies beside this file (hairline.onnx; hairline.md says what it learned from and how well it does). Any
-other takes its place that has the same ends: (1, 3, H, W) RGB in 0..1 to (1, 1, H, W) logits, or to
-(1, 4, H/2, W/2), those of each 2×2 pixels as four channels, for any H and W that are multiples of STRIDE.
+other takes its place that has the same ends: (1, 3, H, W) RGB in 0..1, or what `_folded` makes of the photo,
+to (1, 1, H, W) logits, or to (1, 4, H/2, W/2), those of each 2×2 pixels as four channels, for any H and W
+that are multiples of STRIDE.
 """
 
 import hashlib
+import re
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -33,6 +35,7 @@ STEP_PX = STRIDE << OCTAVES[0]  # windows begin at multiples of it: so do their 
 BAND_PX = 4 << 20  # pixels of an image that are read and reduced at once, unless it is wider than that
 LEAST_ROWS = 128  # of such a band
 MANY = 16  # windows: above, memory is asked for at once and given back at the end, which costs one window
+FOLDED = re.compile(r"<Input>[^\[]*\[\d+ x 12 x")  # in OpenCV's description of a network: its channels
 FILL_PX = 63  # what is not known is filled from this far around
 
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
@@ -54,12 +57,6 @@ class Model(NamedTuple):
     name: str  # for messages
     at_smaller_sizes: bool = False  # ask it again at half size and less, where it sees wide cracks whole
     limits: Limits = USUAL_LIMITS
-    folded: bool = False  # takes pixels as `_folded` has them
-
-
-def as_trained(content: bytes, name: str) -> Model:
-    """A network as training.export writes it."""
-    return Model(content, name, at_smaller_sizes=True, limits=OUR_LIMITS, folded=True)
 
 
 def our_model() -> Model:
@@ -71,7 +68,7 @@ def our_model() -> Model:
         raise BadInput(OURS.name, f"cannot be read ({problem.strerror})", remedy) from None
     if hashlib.sha256(content).hexdigest() != SHA256:
         raise BadInput(OURS.name, "is not the network that this version ships: altered or cut short", remedy)
-    return as_trained(content, OURS.name)
+    return Model(content, OURS.name, at_smaller_sizes=True, limits=OUR_LIMITS)
 
 
 def probability(raster: Raster, model: Model, on_progress: Progress | None = None) -> Probability:
@@ -194,6 +191,7 @@ def _summed(of: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
 class _Net:
     def __init__(self, model: Model) -> None:
         self.model, self.net = model, _read(model)
+        self.folded = FOLDED.search(self.net.dump()) is not None
 
     def logits(self, rgb: Pixels) -> Logits:
         """(H, W) of (H, W, 3)."""
@@ -201,7 +199,7 @@ class _Net:
         down, right = -height % STRIDE, -width % STRIDE
         seen = np.asarray(cv2.copyMakeBorder(rgb, 0, down, 0, right, cv2.BORDER_REFLECT_101), np.uint8)
         rows, columns = seen.shape[:2]
-        pixels = _folded(seen) if self.model.folded else cv2.dnn.blobFromImage(seen, 1.0 / 255.0)
+        pixels = _folded(seen) if self.folded else cv2.dnn.blobFromImage(seen, 1.0 / 255.0)
         try:
             self.net.setInput(pixels)
             logit = np.asarray(self.net.forward(), dtype=np.float32)

@@ -97,7 +97,7 @@ def adjust(
             if _is_told(state, bundle, least_sigma, variance):
                 expected = expected_roll(state, bundle)
                 sigma_roll = learnt_roll(state, bundle, expected, weight / variance, trust)
-                # Again: free as they were, the photos' rolls took over what a slant of the whole does to each.
+                # Again: free as they were, the rolls took over what a slant of the whole does to each photo.
                 bundle = replace(bundle, sigma_roll=sigma_roll, expected_roll=expected)
                 state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
                 weight, trust = _robust(residual, sigma), _trust(state, bundle)

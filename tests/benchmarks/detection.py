@@ -24,7 +24,7 @@ from tasks.assessment.evaluation import evaluate, near, tally
 from tasks.connected import Marked
 from tasks.detection.components import components
 from tasks.detection.detect import detect_image
-from tasks.detection.network import as_trained
+from tasks.detection.network import OUR_LIMITS, Model
 from tasks.detection.sauvola import grey_of, sauvola
 from tests.benchmarks import crack_rows, large_mosaic_rows, wall_rows
 from tests.benchmarks.table import Row, absent, gather, row
@@ -175,7 +175,10 @@ def folds() -> Iterator[Row]:
         what = f"no {missing[0]}: make train-folds" if missing else "cracks/uav is not on this machine"
         yield absent("F1 of hairline on uav, five folds", "", what)
         return
-    of_fold = {k: as_trained(path.read_bytes(), path.name) for k, path in networks.items()}
+    of_fold = {
+        k: Model(path.read_bytes(), path.name, at_smaller_sizes=True, limits=OUR_LIMITS)
+        for k, path in networks.items()
+    }
     found = {
         k: [
             tally(detect_image(rgb, None, DetectSettings(), None, model=model).mask, truth)

@@ -97,6 +97,11 @@ def test_our_network_is_small_and_is_the_one_that_the_code_names() -> None:
     assert network.SHA256 in card
 
 
+def test_a_network_is_asked_for_what_it_takes() -> None:
+    """Ours folded pixels, a guest those of a photo."""
+    assert network._Net(our_model()).folded and not network._Net(GUEST).folded
+
+
 @pytest.mark.parametrize("damage", ["altered", "cut short", "missing"])
 def test_a_damaged_file_of_ours_is_refused(
     damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
