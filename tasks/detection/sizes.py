@@ -124,14 +124,9 @@ def _probable(logit: Logits) -> Logits:
     return p
 
 
-@njit(cache=True, nogil=True)
 def levels(logit: Logits) -> Levels:
     """255 × the probability."""
-    p = np.empty(logit.shape, dtype=np.uint8)
-    for y in range(logit.shape[0]):
-        for x in range(logit.shape[1]):
-            p[y, x] = np.uint8(np.rint(np.float32(255.0) * _sigmoid(logit[y, x])))
-    return p
+    return np.asarray(cv2.divide(255.0, 1.0 + cv2.exp(-logit), dtype=cv2.CV_8U), np.uint8)
 
 
 @njit(cache=True, nogil=True)

@@ -75,11 +75,17 @@ def windows(image: Window, halo_px: int, most_px: int, step_px: int) -> Iterator
 def grid(image: Window, halo_px: int, most_px: int, step_px: int) -> tuple[Pieces, Pieces]:
     """Top and bottom of each row, left and right of each column; all but the ends are multiples of step_px.
     Of the cuts whose windows have at most most_px pixels each, halos included, one that sees the fewest
-    pixels in all."""
+    pixels in all, in the fewest windows."""
     rows = list(_cuts(image.bottom, halo_px, step_px))
     columns = list(_cuts(image.right, halo_px, step_px))
-    _, _, high, wide = min(
-        (row.seen_px * column.seen_px, row.longest_px * column.longest_px, row.pieces, column.pieces)
+    *_, high, wide = min(
+        (
+            row.seen_px * column.seen_px,
+            len(row.pieces) * len(column.pieces),
+            row.longest_px * column.longest_px,
+            row.pieces,
+            column.pieces,
+        )
         for row, column in product(rows, columns)
         if row.longest_px * column.longest_px <= most_px
     )
