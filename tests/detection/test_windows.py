@@ -34,3 +34,9 @@ def test_windows_with_their_halos_are_as_large_as_each_other() -> None:
     image = Window(0, 3000, 0, 4000)
     parts = list(windows(image, 224, 6_000_000, 32))
     assert [part.grown(224, image).area_px for part in parts] == 3 * [3000 * 1632]
+
+
+def test_without_a_halo_windows_are_as_few_as_can_be() -> None:
+    """All cuts see each pixel once then."""
+    assert len(list(windows(Window(0, 3000, 0, 4000), 0, 3 << 20, 64))) == 4
+    assert list(windows(Window(0, 384, 0, 544), 0, 3 << 20, 64)) == [Window(0, 384, 0, 544)]
