@@ -20,7 +20,7 @@ from numba import njit
 
 from schemas.problem import BadInput
 from schemas.raster import Pixels, Progress, Raster
-from tasks.detection.sauvola import Mask
+from tasks.detection.shrunk import Shrunk
 from tasks.detection.sizes import MARGIN_PX, OCTAVES, Answer, Logits, join, levels
 from tasks.detection.windows import Pieces, Window, grid, whole_of
 from tasks.heap import given_back, reused
@@ -34,11 +34,8 @@ SEEN_PX = 6_850_000  # at once, 126 bytes each (measured): half of a photo of 12
 # 1/255 (measured).
 HALO_PX = 192
 STEP_PX = STRIDE << OCTAVES[0]  # windows begin at multiples of it: so do their pixels at each octave
-BAND_PX = 4 << 20  # pixels of an image that are read and reduced at once, unless it is wider than that
-LEAST_ROWS = 128  # of such a band
 MANY = 16  # windows: above, memory is asked for at once and given back at the end, which costs one window
 FOLDED = re.compile(r"<Input>[^\[]*\[\d+ x 12 x")  # in OpenCV's description of a network: its channels
-FILL_PX = 63  # what is not known is filled from this far around
 
 Probability = npt.NDArray[np.uint8]  # (H, W): 255 × the probability
 
@@ -92,11 +89,12 @@ def probabilities(
     with reused():
         if many:  # memory that grows from window to window has holes
             net.logits(np.zeros((_longest(rows), _longest(columns), 3), np.uint8))
-        for window, wider in _windows(net, raster, rows, columns, octaves):
+        shrunk = Shrunk(raster)
+        for window, wider in _windows(net, raster, shrunk, rows, columns, octaves):
             valid = raster.valid(*window)
             if valid.any():
-                seen = window.grown(MARGIN_PX, image)
-                answer = join(_answer(net, raster, window, 0).within(seen), wider).within(window)
+                alone = _answer(net, shrunk, window.grown(HALO_PX, image), 0)
+                answer = join(alone.within(window.grown(MARGIN_PX, image)), wider).within(window)
                 known = np.where(valid, levels(np.asarray(answer.joined, np.float32)), np.uint8(0))
                 yield window, known
             done_px += window.area_px
@@ -116,6 +114,7 @@ def _longest(pieces: Pieces) -> int:
 def _windows(
     net: "_Net",
     raster: Raster,
+    shrunk: Shrunk,
     rows: Pieces,
     columns: Pieces,
     octaves: tuple[int, ...],
@@ -126,75 +125,25 @@ def _windows(
     if not octaves:
         yield from ((Window(*row, *column), wider) for row in rows for column in columns)
         return
-    together = 1 << octaves[0]
+    octave = octaves[0]
+    together = 1 << octave
     for high, wide in product(_lots(rows, together), _lots(columns, together)):
         if any(raster.valid(*row, *column).any() for row in high for column in wide):
             window = Window(high[0][0], high[-1][1], wide[0][0], wide[-1][1])
-            answer = join(_answer(net, raster, window, octaves[0]), wider).compact()
-            yield from _windows(net, raster, high, wide, octaves[1:], (*wider, answer))
+            seen = window.grown(HALO_PX << octave, whole_of(raster))
+            if not wider:
+                shrunk.keep(seen, octave)
+            answer = join(_answer(net, shrunk, seen, octave), wider).compact()
+            yield from _windows(net, raster, shrunk, high, wide, octaves[1:], (*wider, answer))
 
 
 def _lots(pieces: Pieces, size: int) -> list[Pieces]:
     return [pieces[k : k + size] for k in range(0, len(pieces), size)]
 
 
-def _answer(net: "_Net", raster: Raster, window: Window, octave: int) -> Answer:
-    seen = window.grown(HALO_PX << octave, whole_of(raster))
-    logits = net.logits(_reduced(raster, seen, octave))
+def _answer(net: "_Net", shrunk: Shrunk, seen: Window, octave: int) -> Answer:
+    logits = net.logits(shrunk.at(seen, octave))
     return Answer(logits, logits, seen.top, seen.left, octave)
-
-
-def _reduced(raster: Raster, window: Window, octave: int) -> Pixels:
-    """(H, W, 3) of a window at 1 / 2^octave of its size, what is unknown filled; read band by band."""
-    bands: list[Pixels] = []
-    rows = max(LEAST_ROWS, BAND_PX // (window.right - window.left) // STRIDE * STRIDE)
-    for top in range(window.top, window.bottom, rows):
-        bottom = min(window.bottom, top + rows)
-        rgb = _known(raster, window._replace(top=top, bottom=bottom), window)
-        bands.append(_shrunk(rgb, octave))
-    return np.concatenate(bands)
-
-
-def _shrunk(rgb: Pixels, octave: int) -> Pixels:
-    """To 1 / 2^octave of its size, half by half, which is the quick way; mirrored up to a whole pixel."""
-    small, down, right = rgb, -rgb.shape[0] % (1 << octave), -rgb.shape[1] % (1 << octave)
-    if down or right:
-        small = np.asarray(cv2.copyMakeBorder(rgb, 0, down, 0, right, cv2.BORDER_REFLECT_101), np.uint8)
-    for _ in range(octave):
-        size = small.shape[1] // 2, small.shape[0] // 2
-        small = np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_AREA), np.uint8)
-    return small
-
-
-def _known(raster: Raster, band: Window, within: Window) -> Pixels:
-    """(H, W, 3) of a band, what is unknown filled from the rows around it."""
-    if raster.valid(*band).all():
-        return raster.rgb(*band)
-    seen = Window(
-        max(within.top, band.top - FILL_PX), min(within.bottom, band.bottom + FILL_PX), band.left, band.right
-    )
-    return filled(raster.rgb(*seen), raster.valid(*seen))[band.inside(seen)]
-
-
-def filled(rgb: Pixels, valid: Mask) -> Pixels:
-    """(H, W, 3): what is not valid takes the mean of what is around it: its rim looks like nothing."""
-    if valid.all():
-        return rgb
-    if not valid.any():
-        return np.full_like(rgb, 128)
-    weight, unknown = valid.astype(np.float32), ~valid
-    known = _summed(weight)[unknown]
-    whole = rgb.copy()
-    for channel, far in enumerate(rgb[valid].mean(axis=0)):
-        near = _summed(rgb[..., channel] * weight)[unknown] / np.maximum(known, 1.0)
-        whole[..., channel][unknown] = np.rint(np.where(known > 0.5, near, far)).astype(np.uint8)
-    return whole
-
-
-def _summed(of: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    size = (FILL_PX, FILL_PX)
-    summed = cv2.boxFilter(of, -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(summed, np.float32)
 
 
 class _Net:
