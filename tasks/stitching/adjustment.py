@@ -118,24 +118,26 @@ def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) 
     hang on noise: in photos that are all upright a shutter's pull is a stretch of the whole."""
     stiff = replace(bundle, sigma_roll=NO_ROLL)
     start = replace(state, roll=np.zeros_like(state.roll))
-    without, residual, _ = _iterate(start, stiff, least_sigma, variance, CONVERGED[-1])
+    own, may_cost = residuals(state, bundle), np.log(len(bundle.xy)) * state.roll.size
+    enough = _cost(state, bundle, own, max(_sigma(own), least_sigma), variance) + may_cost
+    without, residual, _ = _iterate(start, stiff, least_sigma, variance, CONVERGED[-1], enough)
     sigma = max(_sigma(residual), least_sigma)
-    saved = _cost(without, stiff, residual, sigma, variance) - _cost(
-        state, bundle, residuals(state, bundle), sigma, variance
-    )
-    return bool(saved > np.log(len(residual)) * state.roll.size)
+    saved = _cost(without, stiff, residual, sigma, variance) - _cost(state, bundle, own, sigma, variance)
+    return bool(saved > may_cost)
 
 
 def _iterate(
-    state: State, bundle: Bundle, least_sigma: float, variance: float, converged: float
+    state: State, bundle: Bundle, least_sigma: float, variance: float, converged: float, enough: float = 0.0
 ) -> tuple[State, Array, float]:
-    """To the minimum; residuals (M, 2) and their robust sigma there. variance: of a coordinate of a fully
-    trusted observation, as if all were independent (px²)."""
+    """To the minimum, or to where the cost is low `enough`; residuals (M, 2) and their robust sigma there.
+    variance: of a coordinate of a fully trusted observation, as if all were independent (px²)."""
     damping = 1e-4
     residual, jacobians = linearise(state, bundle)
     for _ in range(ITERATIONS):
         sigma = max(_sigma(residual), least_sigma)
         cost = _cost(state, bundle, residual, sigma, variance)
+        if cost < enough:
+            break
         while True:
             weight, trust = _robust(residual, sigma) / variance, _trust(state, bundle)
             candidate = damped_step(state, bundle, residual, jacobians, weight, trust, damping)

@@ -8,7 +8,7 @@ import numpy as np
 
 from artifacts.store import digest
 from schemas.camera import Camera
-from tasks.photos.sift import detect_features, write_features
+from tasks.photos.sift import UNIT, _root, detect_features, write_features
 
 
 def texture(width: int, height: int, contrast: float = 12.0, seed: int = 0) -> np.ndarray:
@@ -80,6 +80,14 @@ def test_fair_faced_concrete_has_features_and_one_grey_has_none() -> None:
     assert len(detect_features(faint.astype(np.uint8), camera(faint), 2000).xy) > 500
     for blank in (np.full((612, 816), 128, np.uint8), np.full((1, 1), 9, np.uint8)):
         assert len(detect_features(blank, camera(blank), 2000).xy) == 0
+
+
+def test_what_rounding_leaves_below_zero_is_nothing() -> None:
+    """One photo in ninety has such a number; its root was a warning."""
+    described = np.zeros((1, 128), np.float32)
+    described[0, :11] = -1.2e-9, *[0.1] * 10
+    root = _root(described)[0]
+    assert root[0] == 0 and (root[1:11] == round(UNIT * 0.1**0.5)).all() and root[11:].max() == 0
 
 
 def test_same_photo_same_bytes(tmp_path: Path) -> None:
