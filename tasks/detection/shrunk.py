@@ -7,7 +7,7 @@ from schemas.raster import Pixels, Raster
 from tasks.detection.sauvola import Mask
 from tasks.detection.windows import Window
 
-KEPT_PX = 80_000_000  # of a smaller size, kept for those that are smaller still
+KEPT_PX = 50_000_000  # of a smaller size, kept for those that are smaller still
 BAND_PX = 4 << 20  # of an image that are read and shrunk at once, unless it is wider than that
 LEAST_ROWS, STEP_ROWS = 128, 32  # of such a band: all but the last are multiples of STEP_ROWS
 FILL_PX = 63  # what is not known is filled from this far around
