@@ -90,11 +90,11 @@ def probabilities(
         if many:  # memory that grows from window to window has holes
             net.logits(np.zeros((_longest(rows), _longest(columns), 3), np.uint8))
         shrunk = Shrunk(raster)
-        for window, wider in _windows(net, raster, shrunk, rows, columns, octaves):
+        for window, wider in _windows(net, shrunk, rows, columns, octaves):
             valid = raster.valid(*window)
             if valid.any():
-                alone = _answer(net, shrunk, window.grown(HALO_PX, image), 0)
-                answer = join(alone.within(window.grown(MARGIN_PX, image)), wider).within(window)
+                seen = window.grown(MARGIN_PX, image)
+                answer = join(_answer(net, shrunk, window, 0).within(seen), wider).within(window)
                 known = np.where(valid, levels(np.asarray(answer.joined, np.float32)), np.uint8(0))
                 yield window, known
             done_px += window.area_px
@@ -113,7 +113,6 @@ def _longest(pieces: Pieces) -> int:
 
 def _windows(
     net: "_Net",
-    raster: Raster,
     shrunk: Shrunk,
     rows: Pieces,
     columns: Pieces,
@@ -125,23 +124,20 @@ def _windows(
     if not octaves:
         yield from ((Window(*row, *column), wider) for row in rows for column in columns)
         return
-    octave = octaves[0]
-    together = 1 << octave
+    together = 1 << octaves[0]
     for high, wide in product(_lots(rows, together), _lots(columns, together)):
-        if any(raster.valid(*row, *column).any() for row in high for column in wide):
+        if any(shrunk.raster.valid(*row, *column).any() for row in high for column in wide):
             window = Window(high[0][0], high[-1][1], wide[0][0], wide[-1][1])
-            seen = window.grown(HALO_PX << octave, whole_of(raster))
-            if not wider:
-                shrunk.keep(seen, octave)
-            answer = join(_answer(net, shrunk, seen, octave), wider).compact()
-            yield from _windows(net, raster, shrunk, high, wide, octaves[1:], (*wider, answer))
+            answer = join(_answer(net, shrunk, window, octaves[0]), wider).compact()
+            yield from _windows(net, shrunk, high, wide, octaves[1:], (*wider, answer))
 
 
 def _lots(pieces: Pieces, size: int) -> list[Pieces]:
     return [pieces[k : k + size] for k in range(0, len(pieces), size)]
 
 
-def _answer(net: "_Net", shrunk: Shrunk, seen: Window, octave: int) -> Answer:
+def _answer(net: "_Net", shrunk: Shrunk, window: Window, octave: int) -> Answer:
+    seen = window.grown(HALO_PX << octave, whole_of(shrunk.raster))
     logits = net.logits(shrunk.at(seen, octave))
     return Answer(logits, logits, seen.top, seen.left, octave)
 

@@ -14,29 +14,30 @@ FILL_PX = 63  # what is not known is filled from this far around
 
 
 class Shrunk:
-    """Windows of it. They begin at multiples of 2^octave, and end at such or with the image."""
+    """Windows of it. They begin at multiples of 2^octave, and end at such or with the image. The first that is
+    asked for is kept, as far as memory allows, for what lies inside it and is asked for at larger sizes."""
 
     def __init__(self, raster: Raster) -> None:
-        self._raster = raster
+        self.raster = raster
         self._kept: tuple[Window, int, Pixels] | None = None  # where, at which octave, and its pixels
-
-    def keep(self, window: Window, octave: int) -> None:
-        """Read a window once for all that will be asked of it at this octave and others below, as far down as
-        memory allows."""
-        self._kept, finest = None, 1
-        while window.area_px >> 2 * finest > KEPT_PX:
-            finest += 1
-        if finest <= octave:
-            self._kept = window, finest, self._read(window, finest)
 
     def at(self, window: Window, octave: int) -> Pixels:
         """(H, W, 3) of a window."""
+        if self._kept is None or window.grown(0, self._kept[0]) != window:
+            self._keep(window, octave)
         if self._kept is None or octave < self._kept[1]:
             return self._read(window, octave)
         whole, kept, pixels = self._kept
         top, left = (window.top - whole.top) >> kept, (window.left - whole.left) >> kept
         bottom, right = -((whole.top - window.bottom) >> kept), -((whole.left - window.right) >> kept)
         return _halved(pixels[top:bottom, left:right], octave - kept)
+
+    def _keep(self, window: Window, octave: int) -> None:
+        self._kept, finest = None, 1
+        while window.area_px >> 2 * finest > KEPT_PX:
+            finest += 1
+        if finest <= octave:
+            self._kept = window, finest, self._read(window, finest)
 
     def _read(self, window: Window, octave: int) -> Pixels:
         """Band by band."""
@@ -45,7 +46,7 @@ class Shrunk:
         shrunk = np.empty((height, width, 3), np.uint8)
         for top in range(window.top, window.bottom, rows):
             band = window._replace(top=top, bottom=min(window.bottom, top + rows))
-            part = _halved(_known(self._raster, band, window), octave)
+            part = _halved(_known(self.raster, band, window), octave)
             start = (top - window.top) >> octave
             shrunk[start : start + len(part)] = part
         return shrunk

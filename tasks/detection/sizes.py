@@ -109,24 +109,13 @@ def _wide(p: Levels) -> Levels:
     return np.asarray(cv2.morphologyEx(p, cv2.MORPH_OPEN, np.ones((WIDE_PX, WIDE_PX), np.uint8)), np.uint8)
 
 
-@njit(cache=True, nogil=True)
-def _sigmoid(logit: np.float32) -> np.float32:
-    one, most = np.float32(1.0), np.float32(30.0)
-    return np.float32(one / (one + np.exp(-min(max(logit, -most), most))))
-
-
-@njit(cache=True, nogil=True)
 def _probable(logit: Logits) -> Logits:
-    p = np.empty(logit.shape, np.float32)
-    for y in range(logit.shape[0]):
-        for x in range(logit.shape[1]):
-            p[y, x] = _sigmoid(logit[y, x])
-    return p
+    return np.asarray(cv2.divide(1.0, 1.0 + cv2.exp(-logit)), np.float32)
 
 
 def levels(logit: Logits) -> Levels:
     """255 × the probability."""
-    return np.asarray(cv2.divide(255.0, 1.0 + cv2.exp(-logit), dtype=cv2.CV_8U), np.uint8)
+    return np.asarray(cv2.convertScaleAbs(_probable(logit), alpha=255.0), np.uint8)
 
 
 @njit(cache=True, nogil=True)

@@ -75,8 +75,8 @@ def _spread(points: Points, width: int, height: int, most: int) -> npt.NDArray[n
 
 
 def _root(descriptors: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
-    least = descriptors.clip(0.0)  # rounding leaves −1e-9 at times
-    share = least / np.maximum(least.sum(axis=1, keepdims=True), 1e-9)
+    positive = descriptors.clip(0.0)  # rounding leaves −1e-9 at times
+    share = positive / np.maximum(positive.sum(axis=1, keepdims=True), 1e-9)
     return np.asarray(np.minimum(np.rint(np.sqrt(share) * UNIT), 255), dtype=np.uint8)
 
 

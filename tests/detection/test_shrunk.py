@@ -23,7 +23,7 @@ class Counted(ArrayRaster):
 def test_what_is_kept_is_what_would_be_read(octave: int) -> None:
     """But for the last row, which is mirrored up to a whole pixel at another size."""
     kept, read = Shrunk(ArrayRaster(RGB)), Shrunk(ArrayRaster(RGB))
-    kept.keep(WHOLE, 4)
+    kept.at(WHOLE, 4)
     ours, theirs = kept.at(PART, octave), read.at(PART, octave)
     assert ours.shape == theirs.shape == (-(-745 >> octave), 512 >> octave, 3)
     np.testing.assert_array_equal(ours[:-1], theirs[:-1])
@@ -44,7 +44,7 @@ def test_a_window_is_read_once_as_far_as_memory_allows(
 ) -> None:
     monkeypatch.setattr(shrunk, "KEPT_PX", room_px)
     image = Shrunk(Counted(RGB))
-    image.keep(WHOLE, 4)
+    image.at(WHOLE, 4)
     for octave in range(4, -1, -1):
         before = Counted.reads
         image.at(PART, octave)
