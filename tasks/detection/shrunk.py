@@ -14,7 +14,7 @@ FILL_PX = 63  # what is not known is filled from this far around
 
 
 class Shrunk:
-    """Windows of it. They begin at multiples of 2^octave, and end at such or with the image. The first that is
+    """Windows of it. They begin at multiples of 2^octave, and end at such or with the image. The first one
     asked for is kept, as far as memory allows, for what lies inside it and is asked for at larger sizes."""
 
     def __init__(self, raster: Raster) -> None:
