@@ -29,6 +29,13 @@ def test_what_is_kept_is_what_would_be_read(octave: int) -> None:
     np.testing.assert_array_equal(ours[:-1], theirs[:-1])
 
 
+def test_what_lies_elsewhere_is_read_anew() -> None:
+    elsewhere = Window(512, 1001, 256, 777)
+    moved, read = Shrunk(ArrayRaster(RGB)), Shrunk(ArrayRaster(RGB))
+    moved.at(Window(0, 768, 0, 512), 4)
+    np.testing.assert_array_equal(moved.at(elsewhere, 3), read.at(elsewhere, 3))
+
+
 @pytest.mark.parametrize("octave", [1, 2, 3, 4])
 def test_a_pixel_is_the_mean_of_those_it_is_made_of(octave: int) -> None:
     at = Shrunk(ArrayRaster(RGB)).at(PART, octave)
