@@ -81,8 +81,20 @@ def _sigmas_mm(
         at = [nowhere, *(p.camera_uvw_m or nowhere for p in mosaic.placements)]
         cu, cv, cw = np.array(at)[source].transpose(2, 0, 1)
         leaning = np.hypot(u - cu, v - cv) / cw
-        sigmas = np.hypot(sigmas, np.nan_to_num(leaning) * 1000.0 * mosaic.height_sigma_m)
+        height_mm = 1000.0 * _height_sigma_m(mosaic, open_file, u, v)
+        sigmas = np.hypot(sigmas, np.nan_to_num(leaning) * height_mm)
     return sigmas, source == 0
+
+
+def _height_sigma_m(mosaic: Mosaic, open_file: OpenFile, u: Array, v: Array) -> Array:
+    """Of the surface over what the photos are laid on, at (height, width) places."""
+    relief = mosaic.relief
+    if relief is None or relief.sigmas is None:
+        return np.full(u.shape, mosaic.height_sigma_m or 0.0)
+    told = np.load(open_file(relief.sigmas))
+    column = np.clip(np.rint((u - relief.left_m) / relief.cell_m), 0, told.shape[1] - 1).astype(np.int64)
+    row = np.clip(np.rint((v - relief.bottom_m) / relief.cell_m), 0, told.shape[0] - 1).astype(np.int64)
+    return np.asarray(told[row, column], np.float64)
 
 
 def _sources(mosaic: Mosaic, open_file: OpenFile, size: tuple[int, int]) -> npt.NDArray[np.int64]:

@@ -68,7 +68,8 @@ class Mosaic(Contract):
             words += f" (± {100 * self.scale_sigma:.2g} %)"
         if self.relief is not None:
             rms_mm, sigma_mm = 1000 * self.relief.rms_m, 1000 * self.relief.sigma_m
-            words += f"; on the scans' relief ({rms_mm:.1f} mm RMS, known to {sigma_mm:.1f} mm)"
+            whose = self.relief.measured_by
+            words += f"; on the {whose}' relief ({rms_mm:.1f} mm RMS, known to {sigma_mm:.1f} mm)"
         for kind, of in (("fitted", [r for r in self.control if r.used]), ("check", self._checks)):
             if of:
                 rms_mm = math.sqrt(sum(r.length_mm**2 for r in of) / len(of))

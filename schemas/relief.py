@@ -1,4 +1,6 @@
-"""How a surface stands out of its plane, as scans measured it."""
+"""How a surface stands out of its plane, as scans or photos measured it."""
+
+from typing import Literal
 
 from schemas.contract import Contract
 from schemas.file import File
@@ -13,4 +15,6 @@ class Relief(Contract):
     bottom_m: float
     cell_m: float
     rms_m: float  # of the heights: what is lost where the surface is taken for flat
-    sigma_m: float  # 1σ of a height, where there are scan points
+    sigma_m: float  # 1σ of a height, where there are points
+    sigmas: File | None = None  # of each height, as `heights`; None: sigma_m everywhere
+    measured_by: Literal["scans", "photos"] = "scans"

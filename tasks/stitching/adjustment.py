@@ -1,10 +1,11 @@
 """Bundle adjustment of plane-induced cameras: what makes a mosaic metric.
 
 Unknown: eight numbers a photo (rotation, position, rolling shutter), focal length, k1 and principal point per
-camera, the positions' common error, two coordinates per track on the plane. Residuals are pixels of the
-photos as taken, so nothing is gained by shrinking the mosaic: what is left free is a similarity, which the
-priors hold. How much a rolling shutter may do is learnt from all photos together, where they tell of one at
-all: free to do anything in each, it would make them free homographies, which are not metric.
+camera, the positions' common error, two coordinates per track on the surface and its height over it.
+Residuals are pixels of the photos as taken, so nothing is gained by shrinking the mosaic: what is left free
+is a similarity, which the priors hold. How much a rolling shutter may do, and how far points stand off the
+surface, is learnt from all photos together, where they tell of it at all: free to do anything in each, a
+shutter would make them free homographies, which are not metric.
 Levenberg-Marquardt with Cauchy weights; tracks are eliminated (Schur complement, Triggs et al. 2000, section
 6), photos remain as a banded system."""
 
@@ -14,19 +15,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tasks.stitching.bundle import (
+    ALIKE,
+    ON_SURFACE,
     Bundle,
     State,
     build_bundle,
     camera_key,
+    height_weight,
     linearise,
     nominal_lens,
-    points,
     prior_errors,
     residuals,
     sigma_lens,
 )
+from tasks.stitching.heights import Heights, heights_in, learnt_spread, told_spread
 from tasks.stitching.normal_equations import damped_step
 from tasks.stitching.prior import Prior
+from tasks.stitching.rays import points
 from tasks.stitching.shutter import NO_ROLL, expected_roll, learnt_roll
 from tasks.stitching.tracks import Observations
 from tasks.stitching.uncertainty import Certainty, certainty_of, noise
@@ -39,7 +44,6 @@ ITERATIONS = 40
 # Fall of the cost, where one sigma of one unknown costs 1: the last round's answer counts, the others' guess.
 CONVERGED = (1.0, 1.0, 0.1)
 LEAST_DAMPING = 1e-11  # more would hold back what the photos all share, which they hardly tell
-ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens) until residuals tell
 CAUCHY = 2.5  # residuals of this many sigma count half
 OUTLIER = 5.0  # and those of this many are dropped at the end
 LARGEST_ROLL = 0.004  # of the photo's height: 1σ of a rolling shutter's effect before any was seen
@@ -54,6 +58,7 @@ class Adjusted:
     sigma_px: float  # of one coordinate, robust
     bias: Array  # (3,) common error of the prior positions
     certainty: Certainty  # of the photos that `observations` see, in their order
+    heights: Heights | None  # of the points over the surface, where the photos tell of any
 
 
 def adjust(
@@ -63,8 +68,9 @@ def adjust(
     sigma_bias: Array,
     focal_sigmas: Sequence[float],
     on_progress: Callable[[float], None],
+    surface_known: bool = False,
 ) -> Adjusted:
-    """Cameras of all photos that are observed. `views` are first guesses."""
+    """Cameras of all photos that are observed. `views` are first guesses; surface_known: points lie on it."""
     seen = np.unique(observations.photo)
     index = np.full(len(views), -1)
     index[seen] = np.arange(len(seen))
@@ -78,22 +84,32 @@ def adjust(
         lens=nominal_lens(cameras),
         bias=np.zeros(3),
         X=np.zeros((0, 2)),
+        w=np.zeros(0),
     )
     sigma, residual, variance = 0.0, np.zeros((0, 2)), ALIKE * LEAST_SIGMA_PX[0] ** 2
     sigma_roll = np.full(2, LARGEST_ROLL * max(c.height_px for c in cameras))
-    expected = np.zeros_like(state.roll)
+    expected, spread = np.zeros_like(state.roll), ON_SURFACE
     for round_, (least_sigma, converged) in enumerate(zip(LEAST_SIGMA_PX, CONVERGED, strict=True)):
         sigmas = [focal_sigmas[i] for i in seen]
         bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll, expected)
-        state = replace(state, X=points(state, bundle))
+        bundle = replace(bundle, spread=spread)
+        X, w = points(state, bundle, sigma)
+        state = replace(state, X=X, w=w)
         state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
         weight, trust = _robust(residual, sigma), _trust(state, bundle)
         variance = noise(bundle, residual, weight)
         on_progress((round_ + 1) / len(LEAST_SIGMA_PX))
-        good = np.linalg.norm(residual, axis=1) < OUTLIER * sigma
+        # Among free heights few points err; those of a photo that shows much else, trees, are its own still.
+        usual = sigma if spread == ON_SURFACE else LEAST_SIGMA_PX[0]
+        good = np.linalg.norm(residual, axis=1) < OUTLIER * usual
         if round_ < len(LEAST_SIGMA_PX) - 1:
             current = current.where(good)
+        if round_ == 0 and not surface_known:
+            spread, noise_px = told_spread(state, bundle, weight)
+            variance = variance if spread == ON_SURFACE else noise_px**2
         if round_ == len(LEAST_SIGMA_PX) - 2:
+            if spread != ON_SURFACE:
+                spread = learnt_spread(state, bundle, weight / variance)
             if _is_told(state, bundle, least_sigma, variance):
                 expected = expected_roll(state, bundle)
                 sigma_roll = learnt_roll(state, bundle, expected, weight / variance, trust)
@@ -109,7 +125,8 @@ def adjust(
         adjusted[i] = bundle.view(state, k)
     certainty = certainty_of(state, bundle, weight / variance, trust)
     kept = replace(current, photo=seen[current.photo])
-    return Adjusted(tuple(adjusted), kept, residual, sigma, state.bias, certainty)
+    heights = heights_in(state, bundle, weight / variance)
+    return Adjusted(tuple(adjusted), kept, residual, sigma, state.bias, certainty, heights)
 
 
 def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) -> bool:
@@ -127,7 +144,12 @@ def _is_told(state: State, bundle: Bundle, least_sigma: float, variance: float) 
 
 
 def _iterate(
-    state: State, bundle: Bundle, least_sigma: float, variance: float, converged: float, enough: float = 0.0
+    state: State,
+    bundle: Bundle,
+    least_sigma: float,
+    variance: float,
+    converged: float,
+    enough: float = -np.inf,
 ) -> tuple[State, Array, float]:
     """To the minimum, or to where the cost is low `enough`; residuals (M, 2) and their robust sigma there.
     variance: of a coordinate of a fully trusted observation, as if all were independent (px²)."""
@@ -193,6 +215,16 @@ def _cost(state: State, bundle: Bundle, residual: Array, sigma: float, variance:
         (bundle.weight_rotation * turned**2).sum(),
         (bundle.weight_bias * state.bias**2).sum(),
         (((state.roll - bundle.expected_roll) / bundle.sigma_roll) ** 2).sum(),
+        _rough(state, bundle),
         (((state.lens - nominal_lens(bundle.cameras)) / sigma_lens(bundle)) ** 2).sum(),
     )
     return float(sum(terms))
+
+
+def _rough(state: State, bundle: Bundle) -> float:
+    """What heights cost. Those of rough surfaces more, but relative to the cameras' distance: how large the
+    whole is and how far away, with a focal length to match, they do not tell."""
+    if bundle.spread == ON_SURFACE:
+        return float(height_weight(state, bundle) * (state.w**2).sum())
+    independent = bundle.spread.determined / ALIKE
+    return float(independent * (np.log((state.w**2).sum()) - 2.0 * np.log(state.C[:, 2].sum())))

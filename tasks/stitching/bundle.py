@@ -3,7 +3,8 @@
 Residuals are pixels of the photos as taken, through the full model of the lens."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,19 @@ PER_CAMERA = 4  # ln focal length, k1, principal point
 # 1σ of a lens, where its principal point is stated (a calibration) and where not: what k1 may move the
 # photo's edge by, as a share of its radius; and where the axis meets the sensor, in focal lengths.
 K1_AT_EDGE, CENTRE = {True: 0.002, False: 0.03}, {True: 0.0005, False: 0.005}
+ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens), and to lie as high
+HELD_HEIGHT = 1e-9  # 1σ, plane units, of points that lie on the surface
 HELD = 0.01  # 1σ, of its distance and in radians, of the photo that holds a bundle without positions
+
+
+class Spread(NamedTuple):
+    """Of the points' heights over the surface, before the present rays tell them."""
+
+    sigma: float  # 1σ, plane units
+    determined: float  # how many of them the rays determine
+
+
+ON_SURFACE = Spread(HELD_HEIGHT, 0.0)
 
 
 @dataclass(frozen=True)
@@ -30,6 +43,7 @@ class State:
     lens: Array  # (cameras, 4) ln of the focal length over the nominal one, k1, principal point
     bias: Array  # (3,)
     X: Array  # (tracks, 2)
+    w: Array  # (tracks,) heights of the points over the surface
 
 
 @dataclass(frozen=True)
@@ -52,10 +66,16 @@ class Bundle:
     sigma_roll: Array  # (2,) px
     expected_roll: Array  # (n, 2) px
     relief: HeightMap | None
+    spread: Spread = ON_SURFACE
 
     @property
     def shared(self) -> int:
         return PER_CAMERA * len(self.cameras) + 3
+
+    def units_per_px(self, state: State) -> float:
+        """Plane units that a pixel of the usual photo covers."""
+        focal = np.array([c.focal_px for c in self.cameras])[self.camera_of]
+        return float(np.median(state.C[:, 2] / focal))
 
     def view(self, state: State, k: int) -> View:
         c = int(self.camera_of[k])
@@ -124,18 +144,12 @@ def _upright(R: Array) -> Array:
     return np.asarray(rotation(np.array([0.0, 0.0, angle])) @ FACING)
 
 
-def points(state: State, bundle: Bundle) -> Array:
-    """(T, 2) tracks where the present cameras see them, on average."""
-    total = np.zeros((int(bundle.track[-1]) + 1, 2))
-    for k in range(len(state.C)):
-        mine = bundle.photo == k
-        view = bundle.view(state, k)
-        principal, focal = np.asarray(view.camera.principal_px), view.camera.focal_px
-        still = bundle.xy[mine] - bundle.rolled[mine, None] * state.roll[k]
-        ideal = view.camera.undistort((still - principal) / focal) * focal + principal
-        on_plane = replace(view, roll_px=np.zeros(2)).to_plane(ideal)
-        np.add.at(total, bundle.track[mine], np.nan_to_num(on_plane))
-    return np.asarray(total / np.bincount(bundle.track)[:, None])
+def height_weight(state: State, bundle: Bundle) -> float:
+    """1/σ² of the heights: σ² is their squares over how many the rays determine (MacKay 1992), always those
+    of now. Held to what they were, it would hold the scale of the whole to what it was."""
+    if bundle.spread == ON_SURFACE:
+        return 1.0 / HELD_HEIGHT**2
+    return bundle.spread.determined / ALIKE / float((state.w**2).sum())
 
 
 def prior_errors(state: State, bundle: Bundle) -> tuple[Array, Array]:
@@ -162,7 +176,7 @@ def _ideal(state: State, bundle: Bundle) -> tuple[Array, Array]:
     """Ideal image coordinates (M, 2) and points in camera (M, 3)."""
     R, C = state.R[bundle.photo], state.C[bundle.photo]
     height = np.zeros(len(state.X)) if bundle.relief is None else bundle.relief.at(state.X)
-    offset = np.column_stack([state.X, height])[bundle.track] - C
+    offset = np.column_stack([state.X, height + state.w])[bundle.track] - C
     in_camera = np.einsum("mji,mj->mi", R, offset)
     z = np.where(in_camera[:, 2] > 1e-9, in_camera[:, 2], np.nan)
     return in_camera[:, :2] / z[:, None], in_camera
@@ -196,7 +210,7 @@ def _heights_px(bundle: Bundle) -> Array:
 @dataclass(frozen=True)
 class Jacobians:
     camera: Array  # (M, 2, 12) by what the observation's photo and its lens have
-    point: Array  # (M, 2, 2)
+    point: Array  # (M, 2, 3) along the surface, and off it
 
     @property
     def pose(self) -> Array:

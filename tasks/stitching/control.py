@@ -31,6 +31,10 @@ class Gauge:
     scale_from: str  # "targets", "scale bars", "stated GSD"
     used: frozenset[str] = frozenset()  # names of the targets or bars that fixed it
 
+    @property
+    def motion(self) -> tuple[float, float, Array]:
+        return self.scale, self.angle_rad, self.shift
+
 
 @dataclass(frozen=True)
 class Mark:

@@ -24,13 +24,13 @@ def differentiate(
     slope: Array,
     residual: Array,
 ) -> tuple[Array, Array]:
-    """Of residuals as taken: (M, 2, 12) by the photo's eight numbers and its lens's four, and (M, 2, 2) by
-    the point.
+    """Of residuals as taken: (M, 2, 12) by the photo's eight numbers and its lens's four, and (M, 2, 3) by
+    the point: two along the surface, its height over it.
 
     photo, track, rolled (M,): as in Bundle. R (n, 3, 3), focal (n,) px, height (n,) px and roll (n, 2) of the
     photos. in_camera (M, 3); distorted, by_k1 (M, 2) and by_ideal (M, 2, 2): ideal coordinates as the lens
     distorts them, and how these change. slope (tracks, 2) of the surface. residual (M, 2) px."""
-    camera, point = np.zeros((len(photo), 2, 12)), np.empty((len(photo), 2, 2))
+    camera, point = np.zeros((len(photo), 2, 12)), np.empty((len(photo), 2, 3))
     by_camera, moving = np.empty((2, 3)), np.empty((2, 3))
     for m in range(len(photo)):
         k, f = photo[m], focal[photo[m]]
@@ -50,11 +50,12 @@ def differentiate(
             camera[m, i, 8], camera[m, i, 9], camera[m, i, 10 + i] = f * distorted[m, i], f * by_k1[m, i], 1.0
             for j in range(2):  # a point that moves on the surface rises and falls with it
                 point[m, i, j] = moving[i, j] + moving[i, 2] * slope[track[m], j]
+            point[m, i, 2] = moving[i, 2]
         across, along = roll[k] / height[k]  # as taken: what bundle makes of the residuals too
         for j in range(12):
             camera[m, 1, j] /= 1.0 - along
             camera[m, 0, j] += across * camera[m, 1, j]
-        for j in range(2):
+        for j in range(3):
             point[m, 1, j] /= 1.0 - along
             point[m, 0, j] += across * point[m, 1, j]
     return camera, point

@@ -97,7 +97,8 @@ def register_photos(
         gauge = Gauge(settings.gsd_mm_px / 1000.0 / usual_gsd, 0.0, np.zeros(2), "stated GSD")
     doubts = () if gauge is None else _contradicted(name, gauge, frame.scale_from, solved, usual_gsd)
     if gauge is not None:
-        every, solved = [_moved(fate, gauge) for fate in every], _gauged(solved, gauge)
+        solved = _gauged(solved, gauge)
+        every = [_moved(fate, gauge, solved.relief) for fate in every]
         marks, scale_from = placed_marks(sightings, solved.views), gauge.scale_from
     residuals, left_out = (
         ((), ())
@@ -182,17 +183,25 @@ def _renumbered(source: npt.NDArray[np.uint16], shown: Sequence[int]) -> npt.NDA
     return np.array([0, *(i + 1 for i in shown)], np.uint16)[source]
 
 
-def _moved(fate: Fate, gauge: Gauge) -> Fate:
+def _moved(fate: Fate, gauge: Gauge, relief: HeightMap | None) -> Fate:
     if fate.view is None:
         return fate
-    return replace(fate, view=fate.view.moved(gauge.scale, gauge.angle_rad, gauge.shift))
+    return replace(fate, view=replace(fate.view.moved(*gauge.motion), relief=relief))
 
 
 def _gauged(solved: Solved, gauge: Gauge) -> Solved:
     c, s = np.cos(gauge.angle_rad), np.sin(gauge.angle_rad)
     J = gauge.scale * np.array([[c, -s], [s, c]])
-    views = {i: view.moved(gauge.scale, gauge.angle_rad, gauge.shift) for i, view in solved.views.items()}
-    return replace(solved, views=views, covariance={i: J @ two @ J.T for i, two in solved.covariance.items()})
+    relief, sigma = solved.relief, solved.relief_sigma
+    if relief is not None and sigma is not None:  # the photos' own: a scan's lies where it lies
+        relief, sigma = relief.moved(*gauge.motion), sigma.moved(*gauge.motion)
+    return replace(
+        solved,
+        views={i: replace(view.moved(*gauge.motion), relief=relief) for i, view in solved.views.items()},
+        covariance={i: J @ two @ J.T for i, two in solved.covariance.items()},
+        relief=relief,
+        relief_sigma=sigma,
+    )
 
 
 def _reindexed(solved: Solved, good: Sequence[int]) -> Solved:

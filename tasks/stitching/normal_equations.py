@@ -7,11 +7,13 @@ import numba
 import numpy as np
 
 from tasks.stitching.bundle import (
+    ALIKE,
     PER_CAMERA,
     PER_PHOTO,
     Bundle,
     Jacobians,
     State,
+    height_weight,
     nominal_lens,
     prior_errors,
     sigma_lens,
@@ -28,9 +30,9 @@ class Reduced:
     S: Array  # (size, size)
     g: Array  # (size,)
     columns: Index  # (M, 12) unknowns that each observation touches
-    mixed: Array  # (M, 2, 12) and how its track hangs together with them
-    H_inverse: Array  # (tracks, 2, 2)
-    h: Array  # (tracks, 2)
+    mixed: Array  # (M, 3, 12) and how its track hangs together with them
+    H_inverse: Array  # (tracks, 3, 3)
+    h: Array  # (tracks, 3)
 
 
 def reduced(
@@ -52,13 +54,13 @@ def reduced(
         ],
         axis=1,
     )
-    A, g, mixed = np.zeros((size, size)), np.zeros(size), np.empty(camera.shape)
+    A, g, mixed = np.zeros((size, size)), np.zeros(size), np.empty((len(camera), 3, camera.shape[2]))
     _add_observations(A, g, mixed, columns, camera, jacobians.point, residual, weight)
     _add_priors(A, g, state, bundle, trust)
     A[np.diag_indices(size)] *= 1.0 + damping
     tiny = 1e-12 * np.diag(A)
 
-    H_inverse, h = _point_blocks(jacobians.point, weight, residual, bundle.track, len(state.X), damping)
+    H_inverse, h = point_blocks(state, bundle, jacobians.point, weight, residual, damping)
     half = np.zeros_like(A)
     _eliminate(half, g, columns, mixed, bundle.track, H_inverse, h)
     S = A - half - half.T
@@ -81,13 +83,15 @@ def damped_step(
     d = solve_positive(system.S, -system.g, bundle.shared)
     pose, lens = d[: PER_PHOTO * n].reshape(n, PER_PHOTO), d[PER_PHOTO * n : size - 3].reshape(-1, PER_CAMERA)
     back = -system.h - _pulled(system.mixed, d, system.columns, bundle.track, len(state.X))
+    moved = np.einsum("tij,tj->ti", system.H_inverse, back)
     return State(
         R=state.R @ rotation(pose[:, :3]),
         C=state.C + pose[:, 3:6],
         roll=state.roll + pose[:, 6:],
         lens=state.lens + lens,
         bias=state.bias + d[size - 3 :],
-        X=state.X + np.einsum("tij,tj->ti", system.H_inverse, back),
+        X=state.X + moved[:, :2],
+        w=state.w + moved[:, 2],
     )
 
 
@@ -114,7 +118,7 @@ def _add_observations(
             for j in range(PER_PHOTO, width):
                 row[lens + j - PER_PHOTO] += x[i] * camera[m, 0, j] + y[i] * camera[m, 1, j]
             g[columns[m, i]] += x[i] * residual[m, 0] + y[i] * residual[m, 1]
-            for k in range(2):
+            for k in range(3):
                 mixed[m, k, i] = point[m, 0, k] * x[i] + point[m, 1, k] * y[i]
 
 
@@ -125,46 +129,53 @@ def _eliminate(
     """Take the tracks out of g and add what they take out of A to half + halfᵀ; observations are sorted by
     track. Of the columns, a photo's own and its camera's each follow one another: runs that vectorise."""
     width = columns.shape[1]
-    Y = np.empty((2, width))
+    Y = np.empty((3, width))
     for m in range(len(track)):
         t = track[m]
         for i in range(width):
-            for k in range(2):
-                Y[k, i] = H_inverse[t, k, 0] * mixed[m, 0, i] + H_inverse[t, k, 1] * mixed[m, 1, i]
-            g[columns[m, i]] -= Y[0, i] * h[t, 0] + Y[1, i] * h[t, 1]
+            for k in range(3):
+                Y[k, i] = (
+                    H_inverse[t, k, 0] * mixed[m, 0, i]
+                    + H_inverse[t, k, 1] * mixed[m, 1, i]
+                    + H_inverse[t, k, 2] * mixed[m, 2, i]
+                )
+            g[columns[m, i]] -= Y[0, i] * h[t, 0] + Y[1, i] * h[t, 1] + Y[2, i] * h[t, 2]
         for other in range(m, len(track)):
             if track[other] != t:
                 break
             share = 0.5 if other == m else 1.0
             own, lens = columns[other, 0], columns[other, PER_PHOTO]
             for i in range(width):
-                row, y0, y1 = half[columns[m, i]], share * Y[0, i], share * Y[1, i]
+                row, a, b, c = half[columns[m, i]], share * Y[0, i], share * Y[1, i], share * Y[2, i]
                 for j in range(PER_PHOTO):
-                    row[own + j] += y0 * mixed[other, 0, j] + y1 * mixed[other, 1, j]
+                    row[own + j] += a * mixed[other, 0, j] + b * mixed[other, 1, j] + c * mixed[other, 2, j]
                 for j in range(PER_CAMERA):
-                    row[lens + j] += y0 * mixed[other, 0, PER_PHOTO + j] + y1 * mixed[other, 1, PER_PHOTO + j]
+                    k = PER_PHOTO + j
+                    row[lens + j] += a * mixed[other, 0, k] + b * mixed[other, 1, k] + c * mixed[other, 2, k]
 
 
 @numba.njit(cache=True, nogil=True)
 def _pulled(mixed: Array, d: Array, columns: Index, track: Index, tracks: int) -> Array:
-    """(tracks, 2) of what a step d of the photos and the shared unknowns does to the tracks' equations."""
-    pulled = np.zeros((tracks, 2))
+    """(tracks, 3) of what a step d of the photos and the shared unknowns does to the tracks' equations."""
+    pulled = np.zeros((tracks, 3))
     for m in range(len(track)):
         for i in range(columns.shape[1]):
-            for k in range(2):
+            for k in range(3):
                 pulled[track[m], k] += mixed[m, k, i] * d[columns[m, i]]
     return pulled
 
 
-def _point_blocks(
-    point: Array, weight: Array, residual: Array, track: Index, tracks: int, damping: float
+def point_blocks(
+    state: State, bundle: Bundle, point: Array, weight: Array, residual: Array, damping: float
 ) -> tuple[Array, Array]:
-    """(T, 2, 2) inverse damped blocks and (T, 2) gradients of the points."""
-    blocks, pulls = np.zeros((tracks, 2, 2)), np.zeros((tracks, 2))
-    _add_points(blocks, pulls, point, weight, residual, track)
-    a, b, d = blocks[:, 0, 0] * (1.0 + damping), blocks[:, 0, 1], blocks[:, 1, 1] * (1.0 + damping)
-    inverse = np.stack([d, -b, -b, a], axis=1) / (a * d - b * b)[:, None]
-    return inverse.reshape(-1, 2, 2), pulls
+    """(T, 3, 3) inverse damped blocks and (T, 3) gradients of the points."""
+    blocks, pulls = np.zeros((len(state.X), 3, 3)), np.zeros((len(state.X), 3))
+    _add_points(blocks, pulls, point, weight, residual, bundle.track)
+    held = height_weight(state, bundle)
+    blocks[:, 2, 2] += held
+    pulls[:, 2] += held * state.w
+    blocks[:, range(3), range(3)] *= 1.0 + damping
+    return np.asarray(np.linalg.inv(blocks), np.float64), pulls
 
 
 @numba.njit(cache=True, nogil=True)
@@ -174,10 +185,10 @@ def _add_points(
     """In place: what every observation says of its track."""
     for m in range(len(track)):
         t = track[m]
-        for i in range(2):
+        for i in range(3):
             x, y = weight[m] * point[m, 0, i], weight[m] * point[m, 1, i]
             pulls[t, i] += x * residual[m, 0] + y * residual[m, 1]
-            for j in range(2):
+            for j in range(3):
                 blocks[t, i, j] += x * point[m, 0, j] + y * point[m, 1, j]
 
 
@@ -191,6 +202,7 @@ def _add_priors(A: Array, g: Array, state: State, bundle: Bundle, trust: Array) 
     weight = np.concatenate([bundle.weight_rotation, position, rolling], axis=1)
     A[own, own] += weight
     g[own] += weight * np.concatenate([turned, moved, state.roll - bundle.expected_roll], axis=1)
+    g[own[:, 5]] -= bundle.spread.determined / ALIKE / state.C[:, 2].sum()  # see adjustment._cost
     bias = np.arange(size - 3, size)
     A[own[:, 3:6], bias] -= position
     A[bias, own[:, 3:6]] -= position

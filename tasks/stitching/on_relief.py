@@ -14,6 +14,7 @@ from scipy.signal import fftconvolve
 
 from schemas.camera import Camera
 from tasks.stitching.adjustment import Adjusted
+from tasks.stitching.rays import Apart
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.tracks import Observations
 from tasks.stitching.view import Array, View
@@ -64,16 +65,9 @@ def seen_heights(flat: Adjusted, cameras: Sequence[Camera]) -> tuple[Array, Arra
         straight = view.camera.undistort((taken - view.camera.principal_px) / view.camera.focal_px)
         p[mine] = view.to_plane(straight * view.camera.focal_px + view.camera.principal_px)
         g[mine] = (view.C[:2] - p[mine]) / view.C[2]
-    count = np.bincount(track)[:, None]
-
-    def mean(values: Array) -> Array:
-        return np.stack([np.bincount(track, column) for column in values.T], axis=1) / count
-
-    at, lean = mean(p), mean(g)
-    off, leaning = p - at[track], g - lean[track]
-    weight = np.bincount(track, (leaning**2).sum(axis=1))
-    heights = -np.bincount(track, (off * leaning).sum(axis=1)) / np.maximum(weight, 1e-12)
-    return np.asarray(at + heights[:, None] * lean), np.asarray(heights), np.asarray(weight)
+    apart = Apart.of(p, g, track, np.ones(len(track)))
+    heights = apart.agreed / apart.power
+    return np.asarray(apart.at + heights[:, None] * apart.lean), heights, apart.power
 
 
 def best_shift(

@@ -31,6 +31,20 @@ class HeightMap:
         along = np.column_stack([(b - a) * (1 - y) + (d - c) * y, (c - a) * (1 - x) + (d - b) * x])
         return np.asarray(along / self.cell)
 
+    def moved(self, scale: float, angle_rad: float, shift: Array) -> "HeightMap":
+        """Under the similarity q → scale · rotation · q + shift of the plane, on a grid of its own."""
+        c, s = np.cos(angle_rad), np.sin(angle_rad)
+        turn, cell = scale * np.array([[c, -s], [s, c]]), scale * self.cell
+        rows, columns = self.w.shape
+        far = np.array([columns - 1, rows - 1]) * self.cell
+        corners = np.array([self.left, self.bottom]) + far * [[0, 0], [1, 0], [0, 1], [1, 1]]
+        corners = corners @ turn.T + shift
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        across, up = (np.arange(np.ceil(n) + 1) * cell for n in (high - low) / cell - 1e-9)
+        uv = np.stack(np.meshgrid(low[0] + across, low[1] + up), axis=-1).reshape(-1, 2)
+        w = scale * self.at((uv - shift) @ np.linalg.inv(turn).T)
+        return HeightMap(w.reshape(len(up), len(across)), float(low[0]), float(low[1]), cell)
+
     def met(self, uv: Array, C: Array) -> Array:
         """(N, 2) over which the rays from C to the plane's (N, 2) points meet the relief; NaN stays."""
         met = uv

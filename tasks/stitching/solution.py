@@ -1,7 +1,7 @@
 """The paper's registration, whole: match, verify, average, adjust; what the matches hold, metrically."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.averaging import Guess, average
 from tasks.stitching.candidates import candidate_pairs
+from tasks.stitching.kriging import relief_of
 from tasks.stitching.on_relief import on_relief
 from tasks.stitching.pairs import Edge, PhotoFeatures, match_pairs
 from tasks.stitching.placement import elsewhere
@@ -36,6 +37,7 @@ class Solved:
     edges: tuple[Edge, ...]  # that passed the pairwise test, and
     held: frozenset[tuple[int, int]]  # those among them that the whole graph agrees with
     relief: HeightMap | None = None  # that the views look at; None: the plane
+    relief_sigma: HeightMap | None = None  # 1σ of its heights, where the photos themselves told it
 
 
 def solve(
@@ -58,7 +60,9 @@ def solve(
         if len(observations.photo) == 0:
             break
 
-        def adjusted_from(views: Sequence[View], seen: Observations = observations) -> Adjusted:
+        def adjusted_from(
+            views: Sequence[View], surface_known: bool = True, seen: Observations = observations
+        ) -> Adjusted:
             return adjust(
                 views,
                 seen,
@@ -66,9 +70,10 @@ def solve(
                 frame.sigma_bias,
                 focal_sigmas,
                 lambda f: on_progress(0.6 + 0.4 * f),
+                surface_known,
             )
 
-        adjusted = adjusted_from(guess.views)
+        adjusted = adjusted_from(guess.views, relief is not None)
         kept = _kept(observations, adjusted)
         loose = _loose(kept, adjusted)
         if attempt < SPARING:
@@ -79,7 +84,8 @@ def solve(
         if not loose:
             if relief is not None:
                 sigma = float(frame.sigma_bias[:2].max())
-                adjusted = on_relief(relief, adjusted, guess.views, observations, sigma, adjusted_from)
+                raised = on_relief(relief, adjusted, guess.views, observations, sigma, adjusted_from)
+                adjusted = adjusted_from(guess.views, False) if raised is adjusted else raised
             return _solved(adjusted, matched, edges)
         edges = [e for e in edges if e.a not in loose and e.b not in loose]
     return Solved({}, {}, {}, {}, 0.0, 0.0, tuple(matched), frozenset())
@@ -145,8 +151,11 @@ def _solved(adjusted: Adjusted, matched: Sequence[Edge], held: Sequence[Edge]) -
     count = np.bincount(photo, minlength=len(adjusted.views))
     squares = np.bincount(photo, (adjusted.residual_px**2).sum(axis=1), minlength=len(adjusted.views))
     seen = np.flatnonzero(count)
+    relief, relief_sigma = adjusted.views[seen[0]].relief, None
+    if adjusted.heights is not None:
+        relief, relief_sigma = relief_of(adjusted.heights)
     return Solved(
-        views={int(i): adjusted.views[i] for i in seen},
+        views={int(i): replace(adjusted.views[i], relief=relief) for i in seen},
         matches={int(i): int(count[i]) for i in seen},
         rms_px={int(i): float(np.sqrt(squares[i] / count[i])) for i in seen},
         covariance=dict(zip((int(i) for i in seen), adjusted.certainty.relative, strict=True)),
@@ -154,5 +163,6 @@ def _solved(adjusted: Adjusted, matched: Sequence[Edge], held: Sequence[Edge]) -
         sigma_px=adjusted.sigma_px,
         edges=tuple(matched),
         held=frozenset((edge.a, edge.b) for edge in held),
-        relief=adjusted.views[seen[0]].relief,
+        relief=relief,
+        relief_sigma=relief_sigma,
     )

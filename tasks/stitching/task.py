@@ -113,7 +113,8 @@ def stitch(
     canvas, metric = registered.canvas, registered.scale_from != "none"
     placements = tuple(_placement(registered, i, float(gains[i])) for i in range(len(ordered)))
     solved = registered.solved
-    on_relief = relief if solved.relief is not None else None
+    on_relief = _own_relief(registered, metric) if solved.relief_sigma is not None else relief
+    on_relief = on_relief if solved.relief is not None else None
     squares = [solved.matches[i] * rms**2 for i, rms in solved.rms_px.items()]
     return _written(
         tiles,
@@ -208,6 +209,27 @@ def _height_map(relief: Relief | None) -> "HeightMap | None":
         return None
     heights = np.load(store.current().path(relief.heights)).astype(np.float64)
     return HeightMap(heights, relief.left_m, relief.bottom_m, relief.cell_m)
+
+
+def _own_relief(registered: "Registered", metric: bool) -> Relief | None:
+    """The one that the photos themselves told; None where nothing is known in metres."""
+    heights, sigma = registered.solved.relief, registered.solved.relief_sigma
+    if heights is None or sigma is None or not metric:
+        return None
+    with store.current().scratch() as folder:
+        np.save(folder / "heights.npy", heights.w.astype(np.float32))
+        np.save(folder / "sigmas.npy", sigma.w.astype(np.float32))
+        return Relief(
+            surface=registered.surface.name if registered.surface else "",
+            heights=store.current().put(folder / "heights.npy"),
+            sigmas=store.current().put(folder / "sigmas.npy"),
+            left_m=heights.left,
+            bottom_m=heights.bottom,
+            cell_m=heights.cell,
+            rms_m=float(np.sqrt(np.mean(heights.w**2))),
+            sigma_m=float(np.median(sigma.w)),
+            measured_by="photos",
+        )
 
 
 def _height_sigma_m(surface: Surface | None, relief: Relief | None) -> float | None:

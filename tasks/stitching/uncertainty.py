@@ -65,9 +65,8 @@ def noise(bundle: Bundle, residual: Array, share: Array) -> float:
     cells_of_photo = np.bincount(np.unique(cell[used[cell]]) // (CELLS[0] * CELLS[1]))
     free = 2.0 * cells_of_photo.sum()
     between *= free / max(free - PER_PHOTO * (cells_of_photo > 0).sum(), 0.1 * free)
-    followed = len(residual) / max(
-        len(residual) - int(bundle.track[-1]) - 1, 1
-    )  # by points, of the residuals
+    unknown = 2 * (int(bundle.track[-1]) + 1) + bundle.spread.determined  # points follow the residuals
+    followed = residual.size / max(residual.size - unknown, 2)
     return float(max(within, between, 1e-12) * followed)
 
 
@@ -84,8 +83,8 @@ def _middles(state: State, bundle: Bundle, size: int) -> tuple[Array, Array]:
     X = np.stack([v.centre_uv for v in views])
     photo = np.arange(n)
     seen = replace(bundle, photo=photo, track=photo, xy=np.zeros((n, 2)), rolled=np.zeros(n))
-    _, jacobians = linearise(replace(state, X=X), seen)
-    moves = -np.linalg.solve(jacobians.point, jacobians.camera)
+    _, jacobians = linearise(replace(state, X=X, w=np.zeros(n)), seen)
+    moves = -np.linalg.solve(jacobians.point[:, :, :2], jacobians.camera)
     J = np.zeros((n, 2, size))
     J[photo[:, None], :, PER_PHOTO * photo[:, None] + np.arange(PER_PHOTO)] = np.swapaxes(
         moves[:, :, :PER_PHOTO], 1, 2

@@ -39,8 +39,8 @@ def errors(mosaic: Mosaic, photos: WallPhotos, heights: HeightMap | None) -> Err
     ]
     real = [photos.truth[photo.name].uv_m for photo, _ in solved]
     off = _after_similarity(found, real) / GSD_M
-    middle = [one.mean(axis=0)[None] for one in found]
-    drift = _after_similarity(middle, [one.mean(axis=0)[None] for one in real])
+    middle = [one[len(one) // 2, None] for one in found]
+    drift = _after_similarity(middle, [one[len(one) // 2, None] for one in real])
     d2 = [
         float(e @ np.linalg.solve(np.array(placement.covariance_mm2), e))
         for (_, placement), e in zip(solved, drift * 1000.0, strict=True)

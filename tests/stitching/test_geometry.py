@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from schemas.camera import Camera
 from schemas.problem import BadInput
-from tasks.stitching.bundle import State, build_bundle, linearise, points, residuals
+from tasks.stitching.bundle import State, build_bundle, linearise, residuals
 from tasks.stitching.canvas import Canvas, lay_out
 from tasks.stitching.prior import Prior
+from tasks.stitching.rays import points
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.seams import photo_map
 from tasks.stitching.skyline import solve_positive
@@ -113,8 +114,10 @@ def test_derivatives_of_the_bundle(camera: Camera, relief: HeightMap | None) -> 
         lens=np.array([[0.01, -0.05, 395.0, 302.0]]),
         bias=np.zeros(3),
         X=np.zeros((0, 2)),
+        w=np.zeros(0),
     )
-    state = replace(state, X=points(state, bundle))
+    X, _ = points(state, bundle, 0.5)
+    state = replace(state, X=X, w=rng.normal(0.0, 0.02, len(X)))
     start, jacobians = linearise(state, bundle)
     np.testing.assert_allclose(start, residuals(state, bundle), atol=1e-9)
     step = 1e-6
@@ -137,6 +140,9 @@ def test_derivatives_of_the_bundle(camera: Camera, relief: HeightMap | None) -> 
         shifted = replace(state, X=state.X + step * np.eye(2)[k])
         numeric = (residuals(shifted, bundle) - start) / step
         np.testing.assert_allclose(numeric, jacobians.point[:, :, k], atol=2e-2)
+    raised = replace(state, w=state.w + step)
+    numeric = (residuals(raised, bundle) - start) / step
+    np.testing.assert_allclose(numeric, jacobians.point[:, :, 2], atol=2e-2)
 
 
 def test_a_rolling_shutter_moves_rows_in_proportion() -> None:

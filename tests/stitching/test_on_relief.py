@@ -33,7 +33,7 @@ def laid(true: list[View], relief: HeightMap) -> tuple[Adjusted, Adjusted]:
     said, seen, priors = observed(true, 0.3, 20)
 
     def adjusted(views: Sequence[View]) -> Adjusted:
-        return adjust(views, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None)
+        return adjust(views, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None, surface_known=True)
 
     flat = adjusted(said)
     return flat, on_relief(relief, flat, said, seen, 0.05, adjusted)
