@@ -12,11 +12,12 @@ from tasks.stitching.heights import Heights
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.view import Array
 
-CELLS = 2.0  # of the map, in a mean distance of points
+THINNED = 0.5  # of a mean distance of points: nearer ones are one
+FINE = 1.0 / 6.0  # of the reach, cells of the map: linear between them, it errs by 2 % of the heights
 NEAREST = 24  # points that tell the height of a place
 REACHES = 2.0 ** np.arange(0.0, 5.0, 0.5)  # over which heights may be alike, in mean distances of points
 ALONE = (0.0, 0.03, 0.3)  # share of their variance that may be each point's own
-TRIED = 1000  # points, to tell these two
+TRIED = 500  # points, to tell these two
 TOGETHER = 4096  # places, in one go
 
 
@@ -64,9 +65,10 @@ def relief_of(heights: Heights) -> tuple[HeightMap, HeightMap]:
     """The surface, and 1σ of its height: far from any point that of a place of which nothing is known."""
     low, size = heights.at.min(axis=0), np.ptp(heights.at, axis=0)
     points = len(heights.w)
-    cell = max(float(np.sqrt(size.prod() / points)), float(size.max()) / points) / CELLS
-    known, mean = _known(heights, low, cell)
-    process = _likeliest(known, heights.usual, CELLS * cell)
+    spacing = max(float(np.sqrt(size.prod() / points)), float(size.max()) / points)
+    known, mean = _known(heights, low, THINNED * spacing)
+    process = _likeliest(known, heights.usual, spacing)
+    cell = max(THINNED * spacing, FINE * process.reach)
     columns, rows = (max(2, int(n)) for n in np.ceil(size / cell) + 1)
     u, v = np.meshgrid(low[0] + cell * np.arange(columns), low[1] + cell * np.arange(rows))
     w, variance = known.foretold(process, np.column_stack([u.ravel(), v.ravel()]))

@@ -14,7 +14,7 @@ from scipy.signal import fftconvolve
 
 from schemas.camera import Camera
 from tasks.stitching.adjustment import Adjusted
-from tasks.stitching.rays import Apart
+from tasks.stitching.rays import Apart, as_taken, rays_of
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.tracks import Observations
 from tasks.stitching.view import Array, View
@@ -59,12 +59,8 @@ def seen_heights(flat: Adjusted, cameras: Sequence[Camera]) -> tuple[Array, Arra
     photo, track = flat.observations.photo, flat.observations.track
     p, g = np.zeros((len(photo), 2)), np.zeros((len(photo), 2))
     for i in np.unique(photo):
-        mine, view, camera = photo == i, flat.views[i], cameras[i]
-        ideal = (flat.observations.xy[mine] - camera.principal_px) / camera.focal_px
-        taken = camera.distort(ideal) * camera.focal_px + camera.principal_px
-        straight = view.camera.undistort((taken - view.camera.principal_px) / view.camera.focal_px)
-        p[mine] = view.to_plane(straight * view.camera.focal_px + view.camera.principal_px)
-        g[mine] = (view.C[:2] - p[mine]) / view.C[2]
+        mine = photo == i
+        p[mine], g[mine] = rays_of(flat.views[i], as_taken(flat.observations.xy[mine], cameras[i]))
     apart = Apart.of(p, g, track, np.ones(len(track)))
     heights = apart.agreed / apart.power
     return np.asarray(apart.at + heights[:, None] * apart.lean), heights, apart.power

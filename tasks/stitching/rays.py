@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from schemas.camera import Camera
 from tasks.stitching.bundle import ON_SURFACE, Bundle, State
 from tasks.stitching.tracks import Index
-from tasks.stitching.view import Array
+from tasks.stitching.view import Array, View, rolled
 
 
 def points(state: State, bundle: Bundle, noise_px: float) -> tuple[Array, Array]:
@@ -21,19 +22,29 @@ def points(state: State, bundle: Bundle, noise_px: float) -> tuple[Array, Array]
 
 
 def rays(state: State, bundle: Bundle) -> tuple[Array, Array]:
-    """(M, 2) where the ray of each observation meets the surface, and (M, 2) how far along it goes per unit
-    that it lies higher; 0 both where it misses."""
+    """(M, 2) and (M, 2) of the observations, as rays_of gives them."""
     p, lean = np.zeros((len(bundle.xy), 2)), np.zeros((len(bundle.xy), 2))
     for k in range(len(state.C)):
         mine = bundle.photo == k
-        view = bundle.view(state, k)
-        principal, focal = np.asarray(view.camera.principal_px), view.camera.focal_px
-        still = bundle.xy[mine] - bundle.rolled[mine, None] * state.roll[k]
-        ideal = view.camera.undistort((still - principal) / focal) * focal + principal
-        met = np.nan_to_num(replace(view, roll_px=np.zeros(2)).to_plane(ideal))
-        height = 0.0 if bundle.relief is None else bundle.relief.at(met)[:, None]
-        p[mine], lean[mine] = met, (view.C[:2] - met) / (view.C[2] - height)
+        p[mine], lean[mine] = rays_of(bundle.view(state, k), bundle.xy[mine])
     return p, lean
+
+
+def rays_of(view: View, taken_px: Array) -> tuple[Array, Array]:
+    """(N, 2) where the rays of pixels as taken meet the surface, and (N, 2) how far along it they go per unit
+    that it lies higher; 0 both where they miss."""
+    principal, focal = np.asarray(view.camera.principal_px), view.camera.focal_px
+    still = taken_px - rolled(taken_px[:, 1], view.camera)[:, None] * view.roll_px
+    ideal = view.camera.undistort((still - principal) / focal) * focal + principal
+    met = np.nan_to_num(replace(view, roll_px=np.zeros(2)).to_plane(ideal))
+    height = 0.0 if view.relief is None else view.relief.at(met)[:, None]
+    return met, (view.C[:2] - met) / (view.C[2] - height)
+
+
+def as_taken(undistorted_px: Array, camera: Camera) -> Array:
+    """(N, 2) pixels as taken, of those undistorted under a camera."""
+    ideal = (undistorted_px - camera.principal_px) / camera.focal_px
+    return np.asarray(camera.distort(ideal) * camera.focal_px + camera.principal_px)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.averaging import Guess, average
 from tasks.stitching.candidates import candidate_pairs
+from tasks.stitching.denser import denser
 from tasks.stitching.kriging import relief_of
 from tasks.stitching.on_relief import on_relief
 from tasks.stitching.pairs import Edge, PhotoFeatures, match_pairs
@@ -86,7 +87,7 @@ def solve(
                 sigma = float(frame.sigma_bias[:2].max())
                 raised = on_relief(relief, adjusted, guess.views, observations, sigma, adjusted_from)
                 adjusted = adjusted_from(guess.views, False) if raised is adjusted else raised
-            return _solved(adjusted, matched, edges)
+            return _solved(adjusted, matched, edges, features, frame, ransac_px)
         edges = [e for e in edges if e.a not in loose and e.b not in loose]
     return Solved({}, {}, {}, {}, 0.0, 0.0, tuple(matched), frozenset())
 
@@ -146,14 +147,25 @@ def _loosest(loose: set[int], kept: _Kept, edges: Sequence[Edge]) -> set[int]:
     return loose - {a if share[a] > share[b] else b for a, b in tied if share[a] != share[b]}
 
 
-def _solved(adjusted: Adjusted, matched: Sequence[Edge], held: Sequence[Edge]) -> Solved:
+def _solved(
+    adjusted: Adjusted,
+    matched: Sequence[Edge],
+    held: Sequence[Edge],
+    features: Sequence[PhotoFeatures],
+    frame: PlaneFrame,
+    ransac_px: float,
+) -> Solved:
     photo = adjusted.observations.photo
     count = np.bincount(photo, minlength=len(adjusted.views))
     squares = np.bincount(photo, (adjusted.residual_px**2).sum(axis=1), minlength=len(adjusted.views))
     seen = np.flatnonzero(count)
     relief, relief_sigma = adjusted.views[seen[0]].relief, None
     if adjusted.heights is not None:
-        relief, relief_sigma = relief_of(adjusted.heights)
+        cameras = [prior.view.camera for prior in frame.priors]
+        coarse, _ = relief_of(adjusted.heights)
+        usual = adjusted.heights.usual
+        every = denser(adjusted.views, coarse, usual, held, features, cameras, ransac_px)
+        relief, relief_sigma = relief_of(every)
     return Solved(
         views={int(i): replace(adjusted.views[i], relief=relief) for i in seen},
         matches={int(i): int(count[i]) for i in seen},
