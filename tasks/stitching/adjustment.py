@@ -21,6 +21,7 @@ from tasks.stitching.bundle import (
     State,
     build_bundle,
     camera_key,
+    height_squares,
     height_weight,
     linearise,
     nominal_lens,
@@ -227,4 +228,5 @@ def _rough(state: State, bundle: Bundle) -> float:
     if bundle.spread == ON_SURFACE:
         return float(height_weight(state, bundle) * (state.w**2).sum())
     independent = bundle.spread.determined / ALIKE
-    return float(independent * (np.log((state.w**2).sum()) - 2.0 * np.log(state.C[:, 2].sum())))
+    relative = np.sqrt(height_squares(state, bundle)) / state.C[:, 2].sum()
+    return float(2.0 * independent * np.log(relative))

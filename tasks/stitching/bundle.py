@@ -22,6 +22,7 @@ PER_CAMERA = 4  # ln focal length, k1, principal point
 K1_AT_EDGE, CENTRE = {True: 0.002, False: 0.03}, {True: 0.0005, False: 0.005}
 ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens), and to lie as high
 HELD_HEIGHT = 1e-9  # 1σ, plane units, of points that lie on the surface
+LEAST_HEIGHT = 0.1  # RMS, of what it was before
 HELD = 0.01  # 1σ, of its distance and in radians, of the photo that holds a bundle without positions
 
 
@@ -149,7 +150,13 @@ def height_weight(state: State, bundle: Bundle) -> float:
     of now. Held to what they were, it would hold the scale of the whole to what it was."""
     if bundle.spread == ON_SURFACE:
         return 1.0 / HELD_HEIGHT**2
-    return bundle.spread.determined / ALIKE / float((state.w**2).sum())
+    return bundle.spread.determined / ALIKE / height_squares(state, bundle)
+
+
+def height_squares(state: State, bundle: Bundle) -> float:
+    """Of all heights; not quite none, which would hold them at none."""
+    least = LEAST_HEIGHT * bundle.spread.sigma
+    return float((state.w**2).sum() + bundle.spread.determined * least**2)
 
 
 def prior_errors(state: State, bundle: Bundle) -> tuple[Array, Array]:

@@ -35,7 +35,9 @@ def denser(
         for f, camera in zip(features, cameras, strict=True)
     ]
     on_relief = [replace(view, relief=relief) for view in views]
-    places = {a: rays_of(on_relief[a], seen[a].xy.astype(float))[0] for a in sorted({edge.a for edge in edges})}
+    places = {
+        a: rays_of(on_relief[a], seen[a].xy.astype(float))[0] for a in sorted({edge.a for edge in edges})
+    }
     found = [
         replace(
             edge,

@@ -43,10 +43,12 @@ def told_spread(state: State, bundle: Bundle, share: Array) -> tuple[Spread, flo
 
 
 def learnt_spread(state: State, bundle: Bundle, weight: Array) -> Spread:
-    """Of points that are free already. weight: (M,) of the observations, 1/px²."""
+    """Of points that are free already; ON_SURFACE where the rays determine less than half of them: the others
+    would follow the noise. weight: (M,) of the observations, 1/px²."""
     of = ALIKE * height_weight(state, bundle)
     told = _told(state, bundle, weight)
-    return Spread(of**-0.5, float((told / (told + of)).sum()))
+    determined = float((told / (told + of)).sum())
+    return ON_SURFACE if determined < 0.5 * len(told) else Spread(of**-0.5, determined)
 
 
 def heights_in(state: State, bundle: Bundle, weight: Array) -> Heights | None:

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from artifacts import store
 from artifacts.uncertainty_map import _sigmas_mm
+from tasks.stitching import adjustment
 from tasks.stitching.adjustment import Adjusted, adjust
+from tasks.stitching.bundle import Spread
 from tasks.stitching.heights import Heights
 from tasks.stitching.kriging import relief_of
 from tasks.stitching.relief import HeightMap
@@ -76,6 +78,17 @@ def test_flat_walls_have_no_heights(seed: int) -> None:
     true = flown(seed, 1.0)
     said, seen, priors = observed(true, 0.3, seed)
     assert adjust(said, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None).heights is None
+
+
+@pytest.mark.parametrize("seed", [20, 21, 22])
+def test_noise_taken_for_heights_is_seen_to_be_noise(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Left free, they would bend the wall by five pixels."""
+    monkeypatch.setattr(adjustment, "told_spread", lambda *_: (Spread(0.0005, 1000.0), 0.4))
+    true = flown(seed, 0.0)
+    said, seen, priors = observed(true, 0.3, seed)
+    adjusted = adjust(said, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None)
+    assert adjusted.heights is None
+    assert rms_px(adjusted, true) < 0.3
 
 
 def told(noise_m: float, reach_m: tuple[float, float] = (5.0, 4.0)) -> Heights:
