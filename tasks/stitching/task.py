@@ -14,6 +14,7 @@ from artifacts.mosaic import MosaicWriter
 from artifacts.page import Page, page_key
 from artifacts.picture import markdown_of, thumbnail
 from artifacts.raster import TiffWindows
+from artifacts.relief_picture import relief_page
 from artifacts.uncertainty_map import sigma_mm
 from schemas.contract import Matrix3, Vector2, Vector3
 from schemas.control import Control
@@ -71,6 +72,7 @@ def pages(inputs: Mapping[str, Any], mosaic: Mosaic) -> list[Page]:
             f" {sum(not e.held for e in mosaic.edges)} of them false\n\n{markdown_of(graph, mosaic.name)}",
         ),
         Page(key=page_key("photos", mosaic.name), table=rows),
+        *([relief_page(own)] if (own := mosaic.relief) and own.measured_by == "photos" else []),
     ]
 
 
@@ -113,7 +115,7 @@ def stitch(
     canvas, metric = registered.canvas, registered.scale_from != "none"
     placements = tuple(_placement(registered, i, float(gains[i])) for i in range(len(ordered)))
     solved = registered.solved
-    on_relief = _own_relief(registered, metric) if solved.relief_sigma is not None else relief
+    on_relief = _own_relief(name, registered, metric) if solved.relief_sigma is not None else relief
     on_relief = on_relief if solved.relief is not None else None
     squares = [solved.matches[i] * rms**2 for i, rms in solved.rms_px.items()]
     return _written(
@@ -211,7 +213,7 @@ def _height_map(relief: Relief | None) -> "HeightMap | None":
     return HeightMap(heights, relief.left_m, relief.bottom_m, relief.cell_m)
 
 
-def _own_relief(registered: "Registered", metric: bool) -> Relief | None:
+def _own_relief(name: str, registered: "Registered", metric: bool) -> Relief | None:
     """The one that the photos themselves told; None where nothing is known in metres."""
     heights, sigma = registered.solved.relief, registered.solved.relief_sigma
     if heights is None or sigma is None or not metric:
@@ -220,7 +222,7 @@ def _own_relief(registered: "Registered", metric: bool) -> Relief | None:
         np.save(folder / "heights.npy", heights.w.astype(np.float32))
         np.save(folder / "sigmas.npy", sigma.w.astype(np.float32))
         return Relief(
-            surface=registered.surface.name if registered.surface else "",
+            surface=name,
             heights=store.current().put(folder / "heights.npy"),
             sigmas=store.current().put(folder / "sigmas.npy"),
             left_m=heights.left,

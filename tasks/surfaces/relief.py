@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from scipy.fft import dctn, idctn
 from scipy.stats import chi2
 
-from schemas.raster import Pixels
 from tasks.surfaces.cloud import Floats, Indices
 
 REACH_M = 0.15  # off the plane: farther things stand before the surface or lie behind it
@@ -20,7 +18,6 @@ FEWEST = 100  # points
 STANDS_OUT_M = 0.02  # of the median of 5 × 5 cells, beyond noise: no skin of a wall
 MEDIAN = 1.2533  # the median of n points is off by 1.25 σ/√n
 BANDS = 40  # of wave lengths, each as noisy or as real throughout
-DRAWN_PX = 900  # of a picture's longer side
 
 
 @dataclass(frozen=True)
@@ -96,13 +93,3 @@ def _filled(w: Floats, known: Floats) -> Floats:
     coarse = _filled(np.where(weight > 0, mean, 0.0), (weight > 0).astype(np.float64))
     smooth = cv2.resize(coarse, w.shape[::-1], interpolation=cv2.INTER_LINEAR)
     return np.asarray(np.where(known > 0, w, smooth))
-
-
-def draw_heights(w_m: npt.NDArray[np.float32]) -> tuple[Pixels, float, float]:
-    """(H, W, 3) RGB of heights, v up; and those of its darkest and its brightest colour, metres."""
-    low, high = (float(x) for x in np.percentile(w_m, [10, 90]))
-    share = np.clip((w_m - low) / max(high - low, 1e-9), 0, 1)[::-1]
-    size = max(1, round(DRAWN_PX / max(w_m.shape)))
-    coloured = cv2.applyColorMap(np.asarray(255 * share, np.uint8), cv2.COLORMAP_VIRIDIS)
-    large = cv2.resize(coloured, None, fx=size, fy=size, interpolation=cv2.INTER_NEAREST)
-    return np.ascontiguousarray(large[..., ::-1]), low, high

@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from artifacts import store
-from artifacts.page import Page, page_key
+from artifacts.page import Page
 from artifacts.picture import markdown_of
+from artifacts.relief_picture import relief_page
 from schemas.contract import Vector3
 from schemas.raster import Pixels
 from schemas.registered_model import RegisteredModel
@@ -81,18 +82,7 @@ def _triple(place_m: npt.NDArray[np.float64]) -> Vector3:
 
 
 def relief_pages(inputs: Mapping[str, Any], reliefs: tuple[Relief, ...]) -> list[Page]:
-    """A picture of each relief, its colours from the lowest to the highest tenth."""
-    from tasks.surfaces.relief import draw_heights
-
-    pages = []
-    for relief in reliefs:
-        picture, low_m, high_m = draw_heights(np.load(store.current().path(relief.heights)))
-        known = f"{1000 * relief.rms_m:.1f} mm RMS off its plane, known to {1000 * relief.sigma_m:.1f} mm"
-        colours = f"Dark {1000 * low_m:+.1f} mm, bright {1000 * high_m:+.1f} mm"
-        title = f"### Relief of {relief.surface}: {known}\n\n{colours}"
-        drawn = markdown_of(picture, f"heights of {relief.surface} over its plane")
-        pages.append(Page(key=page_key("relief", relief.surface), markdown=f"{title}\n\n{drawn}"))
-    return pages
+    return [relief_page(relief) for relief in reliefs]
 
 
 @stage(pages=relief_pages)

@@ -17,6 +17,7 @@ from tasks.stitching.bundle import Spread
 from tasks.stitching.heights import Heights
 from tasks.stitching.kriging import relief_of
 from tasks.stitching.relief import HeightMap
+from tasks.stitching.task import pages
 from tasks.stitching.view import View
 from tests.benchmarks.mosaic_truth import errors
 from tests.benchmarks.stitching import Run, run
@@ -169,3 +170,8 @@ def test_the_map_of_uncertainty_knows_where_the_relief_is_not_known(unscanned: R
     alike, _ = _sigmas_mm(everywhere, shelf.path, (80, 60))
     assert np.nanmax(sigmas) > 1.5 * np.nanmax(alike)
     assert np.nanmin(sigmas) == pytest.approx(np.nanmin(alike), rel=0.1)
+
+
+def test_the_dashboard_shows_the_photos_own_relief(unscanned: Run) -> None:
+    (page,) = (page for page in pages({}, unscanned.mosaic) if page.key.startswith("relief"))
+    assert "measured by photos" in (page.markdown or "")
