@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from tasks.stitching.heights import Heights
 from tasks.stitching.relief import HeightMap
+from tasks.stitching.tracks import Index
 from tasks.stitching.view import Array
 
 THINNED = 0.5  # of a mean distance of points: nearer ones are one
@@ -18,6 +19,7 @@ NEAREST = 24  # points that tell the height of a place
 REACHES = 2.0 ** np.arange(0.0, 5.0, 0.5)  # over which heights may be alike, in mean distances of points
 ALONE = (0.0, 0.03, 0.3)  # share of their variance that may be each point's own
 TRIED = 500  # points, to tell these two
+ODD = 4.0  # sigma: points so far off show something else, or are false
 TOGETHER = 4096  # places, in one go
 
 
@@ -60,6 +62,17 @@ class Known:
             variance[part] = process.sigma**2 * (1.0 - process.alone) - (weight * alike).sum(axis=1)
         return w, np.maximum(variance, 0.0)
 
+    def odd(self, process: Process, which: Index) -> tuple[Array, Array]:
+        """(K,) how far these points are from where the others foretell them, and (K,) that variance."""
+        w, variance = self.foretold(process, self.at[which], skipped=1)
+        return self.w[which] - w, variance + process.alone * process.sigma**2 + self.sigma[which] ** 2
+
+    def without_odd(self, process: Process) -> "Known":
+        """Without the points that the others belie."""
+        off, variance = self.odd(process, np.arange(len(self.w)))
+        good = off**2 < ODD**2 * variance
+        return Known(self.at[good], self.w[good], self.sigma[good], cKDTree(self.at[good]))
+
 
 def relief_of(heights: Heights) -> tuple[HeightMap, HeightMap]:
     """The surface, and 1σ of its height: far from any point that of a place of which nothing is known."""
@@ -68,6 +81,7 @@ def relief_of(heights: Heights) -> tuple[HeightMap, HeightMap]:
     spacing = max(float(np.sqrt(size.prod() / points)), float(size.max()) / points)
     known, mean = _known(heights, low, THINNED * spacing)
     process = _likeliest(known, heights.usual, spacing)
+    known = known.without_odd(process)
     cell = max(THINNED * spacing, FINE * process.reach)
     columns, rows = (max(2, int(n)) for n in np.ceil(size / cell) + 1)
     u, v = np.meshgrid(low[0] + cell * np.arange(columns), low[1] + cell * np.arange(rows))
@@ -96,9 +110,8 @@ def _likeliest(known: Known, sigma: float, spacing: float) -> Process:
     best, chosen = np.inf, Process(sigma, spacing, 0.0)
     for reach, alone in product(REACHES, ALONE):
         process = Process(sigma, reach * spacing, alone)
-        w, variance = known.foretold(process, known.at[some], skipped=1)
-        variance += alone * sigma**2 + known.sigma[some] ** 2
-        unlikely = float((np.log(variance) + (known.w[some] - w) ** 2 / variance).sum())
+        off, variance = known.odd(process, some)
+        unlikely = float((np.log(variance) + np.minimum(off**2 / variance, ODD**2)).sum())
         if unlikely < best:
             best, chosen = unlikely, process
     return chosen

@@ -34,13 +34,14 @@ def match(a: Descriptors, b: Descriptors) -> Matches:
 def match_guided(
     a: Descriptors, b: Descriptors, predicted_b: Array, xy_b: npt.NDArray[np.float32], radius_px: float
 ) -> Matches:
-    """The most similar feature of b within `radius_px` of where each feature of a is expected; mutual."""
+    """The most similar feature of b within `radius_px` of where each feature of a is expected, one place or
+    several, (N, 2) or (N, K, 2); mutual."""
     if len(a) == 0 or len(b) == 0:
         return np.zeros((0, 2), np.int64)
     expected = np.nan_to_num(predicted_b, nan=-1e9)
     k = min(4, len(b))
     _, near = cKDTree(xy_b).query(expected, k=k, distance_upper_bound=radius_px)
-    near = near.reshape(len(a), k)
+    near = near.reshape(len(a), -1)
     there = near < len(b)
     candidates = b[np.where(there, near, 0)].astype(np.float32)
     similarity = np.where(there, np.einsum("nd,nkd->nk", a.astype(np.float32), candidates), -1.0)

@@ -79,7 +79,7 @@ def _match_pair(
         more = verify(fa.xy, fb.xy, again, camera, within_px)
         if more is not None and len(more.inliers) > len(inliers):
             inliers = more.inliers
-    return Edge(a, b, _spread(inliers, fa.xy))
+    return Edge(a, b, spread(inliers, fa.xy))
 
 
 def _expected_in(features: PhotoFeatures, own: Prior, other: Prior) -> tuple[npt.NDArray[np.int64], float]:
@@ -97,7 +97,7 @@ def _expected_in(features: PhotoFeatures, own: Prior, other: Prior) -> tuple[npt
     return np.flatnonzero(inside), sure / max(len(features.xy), 1)
 
 
-def _spread(matches: Matches, xy: npt.NDArray[np.float32]) -> Matches:
+def spread(matches: Matches, xy: npt.NDArray[np.float32]) -> Matches:
     """At most ENOUGH, the first of each cell of the overlap before the second of any; of a point with two
     directions, so with two features, the second last of all."""
     if len(matches) <= ENOUGH:

@@ -9,9 +9,8 @@ import numpy as np
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.averaging import Guess, average
 from tasks.stitching.candidates import candidate_pairs
-from tasks.stitching.denser import denser
-from tasks.stitching.kriging import relief_of
 from tasks.stitching.on_relief import on_relief
+from tasks.stitching.own_relief import on_own_relief
 from tasks.stitching.pairs import Edge, PhotoFeatures, match_pairs
 from tasks.stitching.placement import elsewhere
 from tasks.stitching.prior import PlaneFrame
@@ -62,7 +61,7 @@ def solve(
             break
 
         def adjusted_from(
-            views: Sequence[View], surface_known: bool = True, seen: Observations = observations
+            views: Sequence[View], seen: Observations = observations, surface_known: bool = True
         ) -> Adjusted:
             return adjust(
                 views,
@@ -74,7 +73,10 @@ def solve(
                 surface_known,
             )
 
-        adjusted = adjusted_from(guess.views, relief is not None)
+        def freed(views: Sequence[View], seen: Observations) -> Adjusted:
+            return adjusted_from(views, seen, False)
+
+        adjusted = adjusted_from(guess.views, surface_known=relief is not None)
         kept = _kept(observations, adjusted)
         loose = _loose(kept, adjusted)
         if attempt < SPARING:
@@ -86,8 +88,11 @@ def solve(
             if relief is not None:
                 sigma = float(frame.sigma_bias[:2].max())
                 raised = on_relief(relief, adjusted, guess.views, observations, sigma, adjusted_from)
-                adjusted = adjusted_from(guess.views, False) if raised is adjusted else raised
-            return _solved(adjusted, matched, edges, features, frame, ransac_px)
+                adjusted = freed(guess.views, observations) if raised is adjusted else raised
+            if adjusted.heights is None:
+                return _solved(adjusted, matched, edges)
+            own = on_own_relief(adjusted, guess.views, edges, features, ransac_px, freed)
+            return _solved(own.adjusted, matched, edges, own.relief, own.sigma)
         edges = [e for e in edges if e.a not in loose and e.b not in loose]
     return Solved({}, {}, {}, {}, 0.0, 0.0, tuple(matched), frozenset())
 
@@ -151,21 +156,14 @@ def _solved(
     adjusted: Adjusted,
     matched: Sequence[Edge],
     held: Sequence[Edge],
-    features: Sequence[PhotoFeatures],
-    frame: PlaneFrame,
-    ransac_px: float,
+    own_relief: HeightMap | None = None,
+    own_sigma: HeightMap | None = None,
 ) -> Solved:
     photo = adjusted.observations.photo
     count = np.bincount(photo, minlength=len(adjusted.views))
     squares = np.bincount(photo, (adjusted.residual_px**2).sum(axis=1), minlength=len(adjusted.views))
     seen = np.flatnonzero(count)
-    relief, relief_sigma = adjusted.views[seen[0]].relief, None
-    if adjusted.heights is not None:
-        cameras = [prior.view.camera for prior in frame.priors]
-        coarse, _ = relief_of(adjusted.heights)
-        usual = adjusted.heights.usual
-        every = denser(adjusted.views, coarse, usual, held, features, cameras, ransac_px)
-        relief, relief_sigma = relief_of(every)
+    relief = own_relief or adjusted.views[seen[0]].relief
     return Solved(
         views={int(i): replace(adjusted.views[i], relief=relief) for i in seen},
         matches={int(i): int(count[i]) for i in seen},
@@ -176,5 +174,5 @@ def _solved(
         edges=tuple(matched),
         held=frozenset((edge.a, edge.b) for edge in held),
         relief=relief,
-        relief_sigma=relief_sigma,
+        relief_sigma=own_sigma,
     )

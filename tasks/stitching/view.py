@@ -57,11 +57,11 @@ class View:
         """(N, 2) undistorted pixels of (N, 2) plane points; NaN behind the camera."""
         return self._rolled(self._ideal(uv) * self.camera.focal_px + self.camera.principal_px)
 
-    def to_photo(self, uv: npt.ArrayLike) -> Array:
-        """(N, 2) pixels of the photo as taken, distortion and rolling shutter included."""
-        return self._rolled(
-            self.camera.distort(self._ideal(uv)) * self.camera.focal_px + self.camera.principal_px
-        )
+    def to_photo(self, uv: npt.ArrayLike, over: npt.ArrayLike = 0.0) -> Array:
+        """(N, 2) pixels of the photo as taken, distortion and rolling shutter included, of (N, 2) places so
+        high over the surface."""
+        ideal = self._ideal(uv, over)
+        return self._rolled(self.camera.distort(ideal) * self.camera.focal_px + self.camera.principal_px)
 
     def _rolled(self, px: Array) -> Array:
         """(N, 2) pixels where a row lies roll_px · rolled(row) farther on than a global shutter shows it."""
@@ -69,13 +69,14 @@ class View:
         y = (px[:, 1] + b * rolled(0.0, self.camera)) / (1 - b / self.camera.height_px)
         return np.column_stack([px[:, 0] + a * rolled(y, self.camera), y])
 
-    def _ideal(self, uv: npt.ArrayLike) -> Array:
-        in_camera = self._in_camera(np.asarray(uv, dtype=float))
+    def _ideal(self, uv: npt.ArrayLike, over: npt.ArrayLike = 0.0) -> Array:
+        in_camera = self._in_camera(np.asarray(uv, dtype=float), over)
         z = np.where(in_camera[:, 2] > 1e-9, in_camera[:, 2], np.nan)
         return np.asarray(in_camera[:, :2] / z[:, None])
 
-    def _in_camera(self, uv: Array) -> Array:
-        points = np.column_stack([uv, np.zeros(len(uv)) if self.relief is None else self.relief.at(uv)])
+    def _in_camera(self, uv: Array, over: npt.ArrayLike = 0.0) -> Array:
+        height = np.zeros(len(uv)) if self.relief is None else self.relief.at(uv)
+        points = np.column_stack([uv, height + np.asarray(over, float)])
         return np.asarray((points - self.C) @ self.R)
 
     @property

@@ -153,6 +153,6 @@ def test_of_a_point_with_two_directions_the_second_match_comes_last() -> None:
     twice = np.concatenate([xy, xy[:40]])
     order = rng.permutation(len(twice))
     matches = np.column_stack([order, order]).astype(np.int64)
-    taken = pairs._spread(matches, twice)
+    taken = pairs.spread(matches, twice)
     assert len(taken) == pairs.ENOUGH
     assert len(np.unique(twice[taken[:, 0]], axis=0)) == pairs.ENOUGH
