@@ -23,7 +23,7 @@ SIGMAS = 3.0  # of the positions: how far the photos may lie from where they wer
 SLOW = 0.25  # of a photo's width: waves longer than some of these bend the cameras instead
 LEAST_LIKENESS = 0.25  # of heights, −1..1; less is chance
 
-Adjust = Callable[[Sequence[View]], Adjusted]
+Adjust = Callable[[Sequence[View], Observations], Adjusted]
 
 
 def on_relief(
@@ -36,7 +36,7 @@ def on_relief(
 ) -> Adjusted:
     """The cameras adjusted on the relief; as they were on the plane where it explains the photos no better.
 
-    guesses: the views that `flat` was adjusted from; `adjust` adjusts others to the same observations."""
+    guesses: the views that `flat` was adjusted from; `adjust` adjusts others."""
     cameras = [view.camera for view in guesses]
     width = float(np.median([v.units_per_px * v.camera.width_px for v in flat.views]))
     at, heights, weight = seen_heights(flat, cameras)
@@ -45,7 +45,7 @@ def on_relief(
         replace(v.moved(1.0, 0.0, shift), camera=c, roll_px=np.zeros(2), relief=relief)
         for v, c in zip(flat.views, cameras, strict=True)
     ]
-    raised = adjust(views)
+    raised = adjust(views, observations)
     kept = len(raised.observations.photo) / len(flat.observations.photo)
     return raised if raised.sigma_px < kept * flat.sigma_px else flat
 

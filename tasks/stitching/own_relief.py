@@ -24,7 +24,7 @@ REACH = 3.0  # sigma of the relief to look above and below it
 PLACES = 6  # at most, to each side of the likeliest, that a point is looked for at
 OUTLIER = 4.0  # sigma: rays that miss one another by more show different points
 
-Adjust = Callable[[Sequence[View], Observations], Adjusted]
+Adjust = Callable[[Sequence[View], Observations], Adjusted | None]  # None: some photo comes loose
 
 
 class OnOwnRelief(NamedTuple):
@@ -53,10 +53,12 @@ def on_own_relief(
         for f, camera in zip(features, cameras, strict=True)
     ]
     within_px = [tolerance_px(camera, ransac_px) for camera in cameras]
-    heights = adjusted.heights
+    held, heights = _matches(edges), adjusted.heights
     for _ in range(ROUNDS):
         usual, (relief, sigma) = heights.usual, relief_of(heights)
         every = _rematched(adjusted.views, relief, sigma, edges, seen, within_px)
+        if _matches(every) < held:
+            break
         heights = _heights(adjusted, every, seen)
         if np.sqrt(np.mean(heights.w**2)) < ROUGHER * usual:
             break
@@ -66,10 +68,16 @@ def on_own_relief(
             for view, camera in zip(adjusted.views, cameras, strict=True)
         ]
         again = adjust(views, build_tracks(some, features))
-        if again.heights is None:
+        if again is None or again.heights is None:
+            break
+        if len(np.setdiff1d(adjusted.observations.photo, again.observations.photo)):
             break
         adjusted, heights = again, _heights(again, every, seen)
     return OnOwnRelief(adjusted, *relief_of(heights))
+
+
+def _matches(edges: Sequence[Edge]) -> int:
+    return sum(len(edge.matches) for edge in edges)
 
 
 def _rematched(

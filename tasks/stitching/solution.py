@@ -52,6 +52,25 @@ def solve(
     """Views of all photos that the matches hold together, on the relief where one is given and fits."""
     matched = match_pairs(pairs, features, frame.priors, ransac_px, lambda f: on_progress(0.6 * f))
     edges = matched
+
+    def adjusted_from(views: Sequence[View], seen: Observations, surface_known: bool) -> Adjusted:
+        return adjust(
+            views,
+            seen,
+            frame.priors,
+            frame.sigma_bias,
+            focal_sigmas,
+            lambda f: on_progress(0.6 + 0.4 * f),
+            surface_known,
+        )
+
+    def laid(views: Sequence[View], seen: Observations) -> Adjusted:
+        return adjusted_from(views, seen, True)
+
+    def freed(views: Sequence[View], seen: Observations) -> Adjusted | None:
+        found = adjusted_from(views, seen, False)
+        return None if _loose(_kept(seen, found), found) else found
+
     for attempt in range(ATTEMPTS):
         guess = average(edges, features, frame.priors, frame.sigma_bias)
         held = _anchored(guess, frame)
@@ -60,23 +79,7 @@ def solve(
         if len(observations.photo) == 0:
             break
 
-        def adjusted_from(
-            views: Sequence[View], seen: Observations = observations, surface_known: bool = True
-        ) -> Adjusted:
-            return adjust(
-                views,
-                seen,
-                frame.priors,
-                frame.sigma_bias,
-                focal_sigmas,
-                lambda f: on_progress(0.6 + 0.4 * f),
-                surface_known,
-            )
-
-        def freed(views: Sequence[View], seen: Observations) -> Adjusted:
-            return adjusted_from(views, seen, False)
-
-        adjusted = adjusted_from(guess.views, surface_known=relief is not None)
+        adjusted = adjusted_from(guess.views, observations, relief is not None)
         kept = _kept(observations, adjusted)
         loose = _loose(kept, adjusted)
         if attempt < SPARING:
@@ -87,8 +90,10 @@ def solve(
         if not loose:
             if relief is not None:
                 sigma = float(frame.sigma_bias[:2].max())
-                raised = on_relief(relief, adjusted, guess.views, observations, sigma, adjusted_from)
-                adjusted = freed(guess.views, observations) if raised is adjusted else raised
+                raised = on_relief(relief, adjusted, guess.views, observations, sigma, laid)
+                if raised is adjusted:
+                    raised = freed(guess.views, observations) or adjusted
+                adjusted = raised
             if adjusted.heights is None:
                 return _solved(adjusted, matched, edges)
             own = on_own_relief(adjusted, guess.views, edges, features, ransac_px, freed)

@@ -14,15 +14,18 @@ from artifacts.uncertainty_map import _sigmas_mm
 from tasks.stitching import adjustment
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.bundle import Spread
+from tasks.stitching.control import Gauge
 from tasks.stitching.heights import Heights
 from tasks.stitching.kriging import relief_of
+from tasks.stitching.mosaicking import _gauged
 from tasks.stitching.relief import HeightMap
+from tasks.stitching.solution import Solved
 from tasks.stitching.task import pages
-from tasks.stitching.view import View
+from tasks.stitching.view import FACING, View
 from tests.benchmarks.mosaic_truth import errors
 from tests.benchmarks.stitching import Run, run
 from tests.benchmarks.wall_photos import CASES, wall_photos
-from tests.stitching.test_adjustment import CORNERS, PIXEL_M, flown, observed, off_m
+from tests.stitching.test_adjustment import CAMERA, CORNERS, PIXEL_M, flown, observed, off_m
 from tests.stitching.test_on_relief import waves
 
 Array = npt.NDArray[np.float64]
@@ -175,3 +178,18 @@ def test_the_map_of_uncertainty_knows_where_the_relief_is_not_known(unscanned: R
 def test_the_dashboard_shows_the_photos_own_relief(unscanned: Run) -> None:
     (page,) = (page for page in pages({}, unscanned.mosaic) if page.key.startswith("relief"))
     assert "measured by photos" in (page.markdown or "")
+
+
+def test_control_moves_the_photos_own_relief_and_leaves_that_of_a_scan_where_it_is() -> None:
+    sigma = HeightMap(np.full((3, 3), 0.001), 0.0, 0.0, 1.0)
+    gauge = Gauge(2.0, 0.0, np.array([1.0, 0.0]), "targets")
+    views = {0: View(CAMERA, FACING, np.array([0.0, 0.0, 4.0]), relief=waves(3))}
+    own = Solved(views, {0: 9}, {0: 0.3}, {0: np.eye(2)}, 0.0, 0.3, (), frozenset(), waves(3), sigma)
+    moved = _gauged(own, gauge)
+    assert moved.relief is not None and moved.relief_sigma is not None
+    assert moved.views[0].relief is moved.relief
+    places = over((-2.0, -1.5), (5.0, 4.0))
+    np.testing.assert_allclose(moved.relief.at(2 * places + [1.0, 0.0]), 2 * waves(3).at(places), atol=1e-9)
+    assert moved.relief_sigma.w.max() == pytest.approx(0.002)
+    scanned = _gauged(replace(own, relief_sigma=None), gauge)
+    assert scanned.relief is own.relief

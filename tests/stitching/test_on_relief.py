@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.on_relief import best_shift, on_relief, seen_heights
 from tasks.stitching.relief import HeightMap
+from tasks.stitching.tracks import Observations
 from tasks.stitching.view import View
 from tests.stitching.test_adjustment import CAMERA, CORNERS, PIXEL_M, flown, observed, off_m
 
@@ -32,10 +33,10 @@ def laid(true: list[View], relief: HeightMap) -> tuple[Adjusted, Adjusted]:
     """Adjusted on the plane, and on the relief."""
     said, seen, priors = observed(true, 0.3, 20)
 
-    def adjusted(views: Sequence[View]) -> Adjusted:
+    def adjusted(views: Sequence[View], seen: Observations) -> Adjusted:
         return adjust(views, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None, surface_known=True)
 
-    flat = adjusted(said)
+    flat = adjusted(said, seen)
     return flat, on_relief(relief, flat, said, seen, 0.05, adjusted)
 
 
