@@ -10,17 +10,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from artifacts import store
-from artifacts.uncertainty_map import _sigmas_mm
+from artifacts.uncertainty_map import _height_sigma_m, _sigmas_mm
 from tasks.stitching import adjustment
 from tasks.stitching.adjustment import Adjusted, adjust
-from tasks.stitching.bundle import Spread
+from tasks.stitching.bundle import ON_SURFACE, Bundle, Spread, State, build_bundle, nominal_lens
 from tasks.stitching.control import Gauge
 from tasks.stitching.heights import Heights
 from tasks.stitching.kriging import relief_of
 from tasks.stitching.mosaicking import _gauged
+from tasks.stitching.normal_equations import _add_priors
+from tasks.stitching.prior import Prior
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.solution import Solved
 from tasks.stitching.task import pages
+from tasks.stitching.tracks import Observations
+from tasks.stitching.uncertainty import noise
 from tasks.stitching.view import FACING, View
 from tests.benchmarks.mosaic_truth import errors
 from tests.benchmarks.stitching import Run, run
@@ -93,6 +97,56 @@ def test_noise_taken_for_heights_is_seen_to_be_noise(seed: int, monkeypatch: pyt
     adjusted = adjust(said, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None)
     assert adjusted.heights is None
     assert rms_px(adjusted, true) < 0.3
+
+
+def freed_bundle(heights_m: float) -> tuple[State, Bundle]:
+    """Two photos, 40 points that stand off the plane."""
+    rng = np.random.default_rng(0)
+    views = flown(20, 0.0)[:2]
+    uv = rng.uniform((0.0, -0.5), (1.0, 0.5), (40, 2))
+    xy = np.concatenate([view.to_photo(uv) for view in views])
+    photo, track = np.repeat([0, 1], 40), np.tile(np.arange(40), 2)
+    order = np.argsort(track, kind="stable")
+    seen = Observations(photo[order], track[order], xy[order])
+    priors = [Prior(v, np.full(3, 0.1), np.full(3, 0.05)) for v in views]
+    known = (priors, np.full(3, 0.1), [0.01, 0.01], np.full(2, 5.0), np.zeros((2, 2)))
+    bundle = replace(build_bundle(views, (CAMERA,), seen, *known), spread=Spread(heights_m, 30.0))
+    state = State(
+        R=np.stack([v.R for v in views]),
+        C=np.stack([v.C for v in views]),
+        roll=np.zeros((2, 2)),
+        lens=nominal_lens((CAMERA,)),
+        bias=np.zeros(3),
+        X=uv,
+        w=rng.normal(0.0, heights_m, 40),
+    )
+    return state, bundle
+
+
+def test_heights_count_relative_to_the_cameras_distance() -> None:
+    """Everything half as large and half as far away is as rough: what it costs, and its slope, agree."""
+    state, bundle = freed_bundle(0.02)
+    cost = adjustment._rough(state, bundle)
+    halved = replace(bundle, spread=bundle.spread._replace(sigma=0.01))
+    smaller = replace(state, C=0.5 * state.C, w=0.5 * state.w)
+    assert adjustment._rough(smaller, halved) == pytest.approx(cost)
+    step = 1e-6 * np.array([[0, 0, 1.0], [0, 0, 0]])
+    farther = replace(state, C=state.C + step)
+    slope = (adjustment._rough(farther, bundle) - cost) / 1e-6
+    pulls = []
+    for of in (bundle, replace(bundle, spread=ON_SURFACE)):
+        A, g = np.zeros((23, 23)), np.zeros(23)
+        _add_priors(A, g, state, of, np.ones(2))
+        pulls.append(g[5])
+    assert pulls[0] - pulls[1] == pytest.approx(slope / 2, rel=1e-4)
+
+
+def test_points_that_are_free_to_rise_follow_more_of_the_noise() -> None:
+    """Of 160 residuals 80 are left by 40 points on a surface, 50 where 30 of their heights are told."""
+    _, bundle = freed_bundle(0.02)
+    residual, share = np.random.default_rng(1).normal(0, 0.3, (80, 2)), np.ones(80)
+    held = noise(replace(bundle, spread=ON_SURFACE), residual, share)
+    assert noise(bundle, residual, share) == pytest.approx(held * 80 / 50)
 
 
 def told(noise_m: float, reach_m: tuple[float, float] = (5.0, 4.0)) -> Heights:
@@ -173,6 +227,14 @@ def test_the_map_of_uncertainty_knows_where_the_relief_is_not_known(unscanned: R
     alike, _ = _sigmas_mm(everywhere, shelf.path, (80, 60))
     assert np.nanmax(sigmas) > 1.5 * np.nanmax(alike)
     assert np.nanmin(sigmas) == pytest.approx(np.nanmin(alike), rel=0.1)
+    told = np.load(shelf.path(mosaic.relief.sigmas)) if mosaic.relief.sigmas else np.zeros((0, 0))
+    row, column = 3, 5
+    u, v = (
+        mosaic.relief.left_m + column * mosaic.relief.cell_m,
+        mosaic.relief.bottom_m + row * mosaic.relief.cell_m,
+    )
+    found = _height_sigma_m(mosaic, shelf.path, np.array([[u]]), np.array([[v]]))
+    assert found[0, 0] == told[row, column] != told[column, row]
 
 
 def test_the_dashboard_shows_the_photos_own_relief(unscanned: Run) -> None:
