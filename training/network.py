@@ -3,22 +3,22 @@ each 2×2 pixels into 16 channels, the last unfolds them, so that edges keep the
 cost."""
 
 from torch import Tensor, nn
+from torch.nn import functional
 
 WIDTHS = (16, 32, 80, 112, 128)  # channels at 1/2, 1/4, 1/8, 1/16, 1/32
 DEPTHS = (2, 2, 4, 4, 5)  # layers there
 
 
 class Mixed(nn.Sequential):
-    """1×1 convolution, batch norm, ReLU."""
+    """1×1 convolution, batch norm."""
 
     def __init__(self, inputs: int, outputs: int) -> None:
-        super().__init__(
-            nn.Conv2d(inputs, outputs, 1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU(inplace=True)
-        )
+        super().__init__(nn.Conv2d(inputs, outputs, 1, bias=False), nn.BatchNorm2d(outputs))
 
 
 class Separable(nn.Module):
-    """Depthwise 3×3, then 1×1; added to its input where the shapes agree."""
+    """Depthwise 3×3, then 1×1, added to its input where the shapes agree, ReLU: in this order OpenCV runs the
+    last three as one, a twelfth of the whole network's time."""
 
     def __init__(self, inputs: int, outputs: int, stride: int = 1) -> None:
         super().__init__()
@@ -28,7 +28,7 @@ class Separable(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         y: Tensor = self.mix(self.across(x))
-        return x + y if self.same else y
+        return functional.relu(x + y if self.same else y)
 
 
 class Up(nn.Module):
@@ -41,7 +41,7 @@ class Up(nn.Module):
         self.join = Separable(width, width)
 
     def forward(self, deep: Tensor, here: Tensor) -> Tensor:
-        out: Tensor = self.join(here + self.enlarge(self.mix(deep)))
+        out: Tensor = self.join(here + self.enlarge(functional.relu(self.mix(deep))))
         return out
 
 

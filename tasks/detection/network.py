@@ -27,9 +27,11 @@ from tasks.heap import given_back, reused
 
 DATA_FILES = ("hairline.onnx",)
 OURS = Path(__file__).with_name("hairline.onnx")
-SHA256 = "1c5fb9f5bf985e43fd7b810e9b747dc71ea6cbe585193a904924931065227907"
+SHA256 = "5f37ed104be5a55ed2297131a12c05244405762bf36e74ca238d86d621602550"
 STRIDE = 32
-SEEN_PX = 6_850_000  # at once, 126 bytes each (measured): half of a photo of 12 MP and its halo
+# At once, some 126 bytes each (measured): of a large image, of which much else is kept; and of one so small
+# that this is all, without any halo.
+SEEN_PX, WHOLE_PX = 6_850_000, 12_600_000
 # Of an octave: what lies further away changes a probability by 3/255 at most, and one of 100,000 by more than
 # 1/255 (measured).
 HALO_PX = 192
@@ -83,7 +85,8 @@ def probabilities(
 ) -> Iterator[tuple[Window, Probability]]:
     """The same of an image of any size, window by window; those where nothing is known are left out."""
     image, octaves = whole_of(raster), OCTAVES if model.at_smaller_sizes else ()
-    rows, columns = grid(image, HALO_PX, SEEN_PX, STEP_PX)
+    most_px = WHOLE_PX if image.area_px <= WHOLE_PX else SEEN_PX
+    rows, columns = grid(image, HALO_PX, most_px, STEP_PX)
     net, many = _Net(model), len(rows) * len(columns) > MANY
     done_px = 0
     with reused():

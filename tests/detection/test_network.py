@@ -128,6 +128,7 @@ def test_windows_give_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> N
     valid[400:600, 900:1150] = False
     whole = probability(ArrayRaster(rgb, valid), our_model()).astype(int)
     monkeypatch.setattr(network, "SEEN_PX", 950_000)
+    monkeypatch.setattr(network, "WHOLE_PX", 950_000)
     done: list[float] = []
     parts = probability(ArrayRaster(rgb, valid), our_model(), done.append).astype(int)
     assert (whole > 200).any() and len(done) > 4 and done == sorted(done) and done[-1] == 1.0
