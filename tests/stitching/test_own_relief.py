@@ -1,8 +1,9 @@
 """Surfaces too rough for any plane to carry their matches: what lies near one leads to the rest."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -58,8 +59,17 @@ def shown(true: list[View]) -> tuple[list[PhotoFeatures], list[Edge]]:
     return features, edges
 
 
-def followed(factor: float) -> tuple[Adjusted, OnOwnRelief]:
-    """Adjusted to the matches of what lies near the plane, and on the relief that these lead to."""
+class Found(NamedTuple):
+    first: Adjusted
+    own: OnOwnRelief
+
+
+Adjusting = Callable[[Sequence[View], Observations], Adjusted | None]
+
+
+def followed(factor: float, again: Callable[[Adjusting], Adjusting] = lambda as_is: as_is) -> Found:
+    """Adjusted to the matches of what lies near the plane, and on the relief that these lead to; `again`
+    makes of the adjustment what is adjusted anew with."""
     true = [replace(view, relief=rough(factor)) for view in flown(20, 0.0)]
     said, _, priors = observed(true, 0.3, 20)
     features, edges = shown(true)
@@ -68,7 +78,7 @@ def followed(factor: float) -> tuple[Adjusted, OnOwnRelief]:
         return adjust(views, seen, priors, np.full(3, 0.05), [0.01] * 12, lambda _: None)
 
     first = freed(said, build_tracks(edges, features))
-    return first, on_own_relief(first, said, edges, features, 3.0, freed)
+    return Found(first, on_own_relief(first, said, edges, features, 3.0, again(freed)))
 
 
 def test_what_lies_near_a_plane_leads_to_the_rest() -> None:
@@ -96,6 +106,21 @@ def test_points_are_looked_for_as_far_along_their_rays_as_the_relief_is_unsure(
     _, own = followed(7.0)
     assert own.adjusted.heights is not None
     assert own.adjusted.heights.usual > 0.028
+
+
+def without_the_last(adjusting: Adjusting) -> Adjusting:
+    def adjusted(views: Sequence[View], seen: Observations) -> Adjusted | None:
+        return adjusting(views, seen.where(seen.photo < len(views) - 1))
+
+    return adjusted
+
+
+@pytest.mark.parametrize("again", [lambda _: lambda *_: None, without_the_last], ids=["loose", "lost"])
+def test_no_relief_costs_a_photo(again: Callable[[Adjusting], Adjusting]) -> None:
+    """The cameras stay as they were; the relief is that of all points that they show."""
+    first, own = followed(3.0, again)
+    assert own.adjusted is first
+    assert np.median(own.sigma.w) < 0.01
 
 
 def _shift(adjusted: Adjusted) -> Array:
