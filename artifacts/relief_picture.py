@@ -20,7 +20,8 @@ def relief_page(relief: Relief) -> Page:
     colours = f"Dark {1000 * low_m:+.1f} mm, bright {1000 * high_m:+.1f} mm, measured by {relief.measured_by}"
     title = f"### Relief of {relief.surface}: {known}\n\n{colours}"
     drawn = markdown_of(picture, f"heights of {relief.surface} over its plane")
-    return Page(key=page_key("relief", relief.surface), markdown=f"{title}\n\n{drawn}")
+    key = page_key(f"relief-by-{relief.measured_by}", relief.surface)  # a surface may have one of each
+    return Page(key=key, markdown=f"{title}\n\n{drawn}")
 
 
 def _drawn(w_m: npt.NDArray[np.float32]) -> tuple[Pixels, float, float]:

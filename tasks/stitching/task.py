@@ -115,8 +115,9 @@ def stitch(
     canvas, metric = registered.canvas, registered.scale_from != "none"
     placements = tuple(_placement(registered, i, float(gains[i])) for i in range(len(ordered)))
     solved = registered.solved
-    on_relief = _own_relief(name, registered, metric) if solved.relief_sigma is not None else relief
-    on_relief = on_relief if solved.relief is not None else None
+    on_relief = None
+    if solved.relief is not None:  # the scan's, unless the photos told 1σ of one of their own
+        on_relief = relief if solved.relief_sigma is None else _own_relief(name, registered, metric)
     squares = [solved.matches[i] * rms**2 for i, rms in solved.rms_px.items()]
     return _written(
         tiles,

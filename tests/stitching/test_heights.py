@@ -238,7 +238,7 @@ def test_the_map_of_uncertainty_knows_where_the_relief_is_not_known(unscanned: R
 
 
 def test_the_dashboard_shows_the_photos_own_relief(unscanned: Run) -> None:
-    (page,) = (page for page in pages({}, unscanned.mosaic) if page.key.startswith("relief"))
+    (page,) = (page for page in pages({}, unscanned.mosaic) if page.key.startswith("relief-by-photos"))
     assert "measured by photos" in (page.markdown or "")
 
 
