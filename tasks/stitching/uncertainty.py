@@ -4,13 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.stitching.bundle import PER_CAMERA, PER_PHOTO, Bundle, State, linearise
+from tasks.stitching.bundle import ON_SURFACE, PER_CAMERA, PER_PHOTO, Bundle, State, linearise
 from tasks.stitching.normal_equations import reduced
 from tasks.stitching.skyline import solve_positive
 from tasks.stitching.tracks import Index
 from tasks.stitching.view import Array
 
 CELLS = (4, 3)  # across and down a photo: residuals within one err alike (relief, lens, shutter)
+COSTLESS = 1e-6  # of what heights cost: so little that they hold nothing, and every block has an inverse
 FEWEST = 4  # observations that make a cell's mean worth looking at
 
 
@@ -24,21 +25,33 @@ class Certainty:
 
 
 def certainty_of(state: State, bundle: Bundle, weight: Array, trust: Array) -> Certainty:
-    """Of the bundle's photos; weights as in the adjustment."""
-    residual, jacobians = linearise(state, bundle)
-    system = reduced(state, bundle, residual, jacobians, weight, trust, 0.0)
-    middles, J = _middles(state, bundle, len(system.g))
-    covariance = J @ solve_positive(system.S, np.ascontiguousarray(J.T), bundle.shared)
+    """Of the bundle's photos; weights as in the adjustment.
+
+    How large the whole is heights do not tell, which are known relative to it: left to pull on it here, they
+    would seem to. So the scale is told without what they cost."""
+    middles, covariance = _covariance(state, bundle, weight, trust)
+    told = covariance
+    if bundle.spread != ON_SURFACE:
+        free = bundle.spread._replace(determined=COSTLESS * bundle.spread.determined)
+        _, told = _covariance(state, replace(bundle, spread=free), weight, trust)
     n, z = len(state.C), middles - middles.mean(axis=0)
     turn = np.stack([-z[:, 1], z[:, 0]], axis=1).ravel()
     gauge = np.stack([np.tile([1.0, 0.0], n), np.tile([0.0, 1.0], n), z.ravel(), turn], axis=1)
     gauge = gauge[:, (gauge**2).sum(axis=0) > 0]
     fit = np.linalg.pinv(gauge)
     rest = np.eye(2 * n) - gauge @ fit
-    scale = (fit @ covariance @ fit.T)[2, 2] if gauge.shape[1] == 4 else 0.0
+    scale = (fit @ told @ fit.T)[2, 2] if gauge.shape[1] == 4 else 0.0
     return Certainty(
         _own_blocks(rest @ covariance @ rest.T), _own_blocks(covariance), float(np.sqrt(max(scale, 0.0)))
     )
+
+
+def _covariance(state: State, bundle: Bundle, weight: Array, trust: Array) -> tuple[Array, Array]:
+    """(n, 2) where the photos' middles lie, and (2n, 2n) of these."""
+    residual, jacobians = linearise(state, bundle)
+    system = reduced(state, bundle, residual, jacobians, weight, trust, 0.0)
+    middles, J = _middles(state, bundle, len(system.g))
+    return middles, J @ solve_positive(system.S, np.ascontiguousarray(J.T), bundle.shared)
 
 
 def _own_blocks(covariance: Array) -> Array:

@@ -81,6 +81,15 @@ def test_heights_draw_neither_the_scale_nor_the_focal_length_in(rough: list[View
     assert freed.views[0].camera.focal_px == pytest.approx(2000.0, rel=0.01)
 
 
+def test_heights_do_not_tell_how_large_the_whole_is(rough: list[View]) -> None:
+    """Positions known to five metres do not either: it could be half or twice as large."""
+    said, seen, priors = observed(rough, 0.3, 20)
+    loose = [replace(prior, sigma_position=np.full(3, 5.0)) for prior in priors]
+    adjusted = adjust(said, seen, loose, np.full(3, 5.0), [0.01] * 12, lambda _: None)
+    assert adjusted.heights is not None
+    assert adjusted.certainty.scale > 0.3
+
+
 @pytest.mark.parametrize("seed", [20, 21])
 def test_flat_walls_have_no_heights(seed: int) -> None:
     true = flown(seed, 1.0)
