@@ -28,7 +28,8 @@ def _drawn(w_m: npt.NDArray[np.float32]) -> tuple[Pixels, float, float]:
     """(H, W, 3) RGB of heights, v up; and those of its darkest and its brightest colour, metres."""
     low, high = (float(x) for x in np.percentile(w_m, [10, 90]))
     share = np.clip((w_m - low) / max(high - low, 1e-9), 0, 1)[::-1]
-    size = max(1, round(DRAWN_PX / max(w_m.shape)))
+    size = DRAWN_PX / max(w_m.shape)
     coloured = cv2.applyColorMap(np.asarray(255 * share, np.uint8), cv2.COLORMAP_VIRIDIS)
-    large = cv2.resize(coloured, None, fx=size, fy=size, interpolation=cv2.INTER_NEAREST)
-    return np.ascontiguousarray(large[..., ::-1]), low, high
+    shape = [max(1, round(size * n)) for n in w_m.shape[::-1]]
+    way = cv2.INTER_NEAREST if size > 1 else cv2.INTER_AREA
+    return np.ascontiguousarray(cv2.resize(coloured, shape, interpolation=way)[..., ::-1]), low, high

@@ -92,10 +92,15 @@ def adjust(
     expected, spread = np.zeros_like(state.roll), ON_SURFACE
     for round_, (least_sigma, converged) in enumerate(zip(LEAST_SIGMA_PX, CONVERGED, strict=True)):
         sigmas = [focal_sigmas[i] for i in seen]
-        bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll, expected)
-        bundle = replace(bundle, spread=spread)
-        X, w = points(state, bundle, sigma)
-        state = replace(state, X=X, w=w)
+        while True:
+            bundle = build_bundle(own, cameras, current, own_priors, sigma_bias, sigmas, sigma_roll, expected)
+            bundle = replace(bundle, spread=spread)
+            X, w = points(state, bundle, sigma)
+            state = replace(state, X=X, w=w)
+            faced = np.asarray(np.isfinite(residuals(state, bundle)).all(axis=1))
+            if faced.all():
+                break
+            current = current.where(faced)  # a camera has turned its back on the others
         state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
         weight, trust = _robust(residual, sigma), _trust(state, bundle)
         variance = noise(bundle, residual, weight)

@@ -21,13 +21,13 @@ ROUNDS = 8  # of reweighting
 FALSE_TURN = np.radians(12.0)  # a pair that disagrees by more with the rest is false
 FALSE_SCALE = 0.25  # logarithm of scale
 FALSE_SHIFT = 0.15  # of the photo's width
+FEWEST_MET = 4  # matches on the plane that make a similarity worth looking at
 
 
 @dataclass(frozen=True)
 class Guess:
     views: tuple[View, ...]  # one a photo; its prior where nothing was matched
-    edges: tuple[Edge, ...]  # without the false ones
-    false: tuple[Edge, ...]
+    edges: tuple[Edge, ...]  # without those that are false, or lie beyond a horizon
     component: npt.NDArray[np.int64]  # (N,) connected photos share a number; the largest is 0
 
 
@@ -39,15 +39,14 @@ def average(
 ) -> Guess:
     """sigma_bias: (3,) of the error that all prior positions share."""
     views = [p.view for p in priors]
-    relative = [_similarity(e, features, views) for e in edges]
-    kept = list(range(len(edges)))
+    kept = [(e, one) for e in edges if (one := _similarity(e, features, views)) is not None]
     while True:
-        component = _components([edges[k] for k in kept], len(views))
-        chosen, measured = [edges[k] for k in kept], [relative[k] for k in kept]
+        chosen, measured = [e for e, _ in kept], [one for _, one in kept]
+        component = _components(chosen, len(views))
         log_scale, angle, shift, good = _solve(chosen, measured, len(views), component, views)
         if good.all():
             break
-        kept = [k for k, is_good in zip(kept, good, strict=True) if is_good]
+        kept = [one for one, is_good in zip(kept, good, strict=True) if is_good]
     moved = [
         view.moved(float(np.exp(log_scale[i])), float(angle[i]), shift[i]) for i, view in enumerate(views)
     ]
@@ -57,8 +56,7 @@ def average(
             moved[members[0]] = views[members[0]]
         else:
             _anchor(moved, members, priors, float(sigma_bias[2]))
-    false = tuple(e for k, e in enumerate(edges) if k not in set(kept))
-    return Guess(tuple(moved), tuple(edges[k] for k in kept), false, component)
+    return Guess(tuple(moved), tuple(chosen), component)
 
 
 @dataclass(frozen=True)
@@ -72,13 +70,20 @@ class _Similarity:
     weight: float
 
 
-def _similarity(edge: Edge, features: Sequence[PhotoFeatures], views: Sequence[View]) -> _Similarity:
+def _similarity(
+    edge: Edge, features: Sequence[PhotoFeatures], views: Sequence[View]
+) -> _Similarity | None:
+    """None where hardly any of the matches lies below both photos' horizons."""
     qa = views[edge.a].to_plane(features[edge.a].xy[edge.matches[:, 0]])
     qb = views[edge.b].to_plane(features[edge.b].xy[edge.matches[:, 1]])
+    met = np.isfinite(qa).all(axis=1) & np.isfinite(qb).all(axis=1)
+    if met.sum() < FEWEST_MET:
+        return None
+    qa, qb = qa[met], qb[met]
     a, b = qa.mean(axis=0), qb.mean(axis=0)
     za, zb = (qa - a) @ [1, 1j], (qb - b) @ [1, 1j]
     factor = np.sum(np.conj(za) * zb) / np.sum(np.abs(za) ** 2)
-    weight = float(np.sqrt(len(edge.matches)))
+    weight = float(np.sqrt(len(qa)))
     return _Similarity(float(np.log(np.abs(factor) + 1e-12)), float(np.angle(factor)), a, b, weight)
 
 

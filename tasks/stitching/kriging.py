@@ -77,8 +77,7 @@ class Known:
 def relief_of(heights: Heights) -> tuple[HeightMap, HeightMap]:
     """The surface, and 1σ of its height: far from any point that of a place of which nothing is known."""
     low, size = heights.at.min(axis=0), np.ptp(heights.at, axis=0)
-    points = len(heights.w)
-    spacing = max(float(np.sqrt(size.prod() / points)), float(size.max()) / points)
+    spacing = _spacing(heights.at - low, size)
     known, mean = _known(heights, low, THINNED * spacing)
     process = _likeliest(known, heights.usual, spacing)
     known = known.without_odd(process)
@@ -88,6 +87,15 @@ def relief_of(heights: Heights) -> tuple[HeightMap, HeightMap]:
     w, variance = known.foretold(process, np.column_stack([u.ravel(), v.ravel()]))
     relief = HeightMap((mean + w).reshape(rows, columns), float(low[0]), float(low[1]), cell)
     return relief, replace(relief, w=np.sqrt(variance).reshape(rows, columns))
+
+
+def _spacing(at: Array, size: Array) -> float:
+    """Mean distance of points where there are any: they may lie along a diagonal, or around a corner."""
+    spacing = max(float(np.sqrt(size.prod() / len(at))), float(size.max()) / len(at))
+    for _ in range(3):  # finer squares follow what is there more closely
+        squares = np.unique(np.floor(at / (2.0 * spacing)).astype(np.int64), axis=0)
+        spacing = min(spacing, float(2.0 * spacing * np.sqrt(len(squares) / len(at))))
+    return spacing
 
 
 def _known(heights: Heights, low: Array, cell: float) -> tuple[Known, float]:

@@ -58,7 +58,8 @@ def reduced(
     _add_observations(A, g, mixed, columns, camera, jacobians.point, residual, weight)
     _add_priors(A, g, state, bundle, trust)
     A[np.diag_indices(size)] *= 1.0 + damping
-    tiny = 1e-12 * np.diag(A)
+    # What no observation and no prior tells stays as it is: a photo whose last point was thrown out.
+    tiny = np.where(np.diag(A) > 0.0, 1e-12 * np.diag(A), 1.0)
 
     H_inverse, h = point_blocks(state, bundle, jacobians.point, weight, residual, damping)
     half = np.zeros_like(A)

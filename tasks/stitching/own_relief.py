@@ -131,4 +131,5 @@ def _heights(adjusted: Adjusted, edges: Sequence[Edge], seen: Sequence[PhotoFeat
     noise = float(np.median(missed / chi2.median(free)))  # plane units²
     sigma = np.sqrt(noise / apart.power)
     good = (missed < OUTLIER**2 * free * noise) & (np.abs(w) < OUTLIER * np.hypot(sigma, usual))
+    good &= sigma < usual  # seen from nearly one place, a point could stand anywhere along its rays
     return Heights(at[good], w[good], sigma[good], usual)

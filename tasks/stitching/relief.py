@@ -1,7 +1,9 @@
 """Heights of a surface over its plane, as the cameras above it need them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -30,6 +32,14 @@ class HeightMap:
         (a, b, c, d), x, y = self._corners(uv)
         along = np.column_stack([(b - a) * (1 - y) + (d - c) * y, (c - a) * (1 - x) + (d - b) * x])
         return np.asarray(along / self.cell)
+
+    def seen_by(self, outlines_uv: Sequence[Array]) -> npt.NDArray[np.bool_]:
+        """(rows, columns) which points of the grid lie in one of the outlines, (N, 2) each."""
+        seen = np.zeros(self.w.shape, np.uint8)
+        for outline in outlines_uv:
+            at = np.rint((outline - [self.left, self.bottom]) / self.cell).astype(np.int32)
+            cv2.fillConvexPoly(seen, at, 1)
+        return seen > 0
 
     def moved(self, scale: float, angle_rad: float, shift: Array) -> "HeightMap":
         """Under the similarity q → scale · rotation · q + shift of the plane, on a grid of its own."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ LEAST_KEPT = 0.4  # nor one most of whose points the adjustment threw out
 LARGEST_SCALE = 5.0  # against the median photo: beyond, it has shrunk to nothing or flown away
 LARGEST_MEDIAN_PX = 3.0  # per 2 MP photo; more is a photo in a wrong place, less may be trees on the ground
 SPARING = 2  # first attempts, in which of neighbours only the loosest goes: without it the others may hold
-ATTEMPTS = SPARING + 4
+FEWEST_TOLD = 4  # photos: of fewer a similarity takes up most of what they err by among themselves
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Solved:
     views: dict[int, View]  # photos held by their matches
     matches: dict[int, int]  # points that hold each
     rms_px: dict[int, float]  # of their residuals, in pixels of the photo
-    covariance: dict[int, Array]  # (2, 2), plane units², of where each photo's middle lies among the others
+    covariance: dict[int, Array]  # (2, 2), plane units², of where the photos' middles lie among one another
     sigma_scale: float  # of the whole, relative
     sigma_px: float
     edges: tuple[Edge, ...]  # that passed the pairwise test, and
@@ -71,7 +72,7 @@ def solve(
         found = adjusted_from(views, seen, False)
         return None if _loose(_kept(seen, found), found) else found
 
-    for attempt in range(ATTEMPTS):
+    for attempt in count():
         guess = average(edges, features, frame.priors, frame.sigma_bias)
         held = _anchored(guess, frame)
         edges = [e for e in guess.edges if e.a in held and e.b in held]
@@ -91,14 +92,14 @@ def solve(
             if relief is not None:
                 sigma = float(frame.sigma_bias[:2].max())
                 raised = on_relief(relief, adjusted, guess.views, observations, sigma, laid)
-                if raised is adjusted:
+                if raised is adjusted or _loose(_kept(observations, raised), raised):
                     raised = freed(guess.views, observations) or adjusted
                 adjusted = raised
             if adjusted.heights is None:
                 return _solved(adjusted, matched, edges)
             own = on_own_relief(adjusted, guess.views, edges, features, ransac_px, freed)
             return _solved(own.adjusted, matched, edges, own.relief, own.sigma)
-        edges = [e for e in edges if e.a not in loose and e.b not in loose]
+        edges = [e for e in edges if e.a not in loose and e.b not in loose]  # at least one goes each time
     return Solved({}, {}, {}, {}, 0.0, 0.0, tuple(matched), frozenset())
 
 
@@ -165,15 +166,16 @@ def _solved(
     own_sigma: HeightMap | None = None,
 ) -> Solved:
     photo = adjusted.observations.photo
-    count = np.bincount(photo, minlength=len(adjusted.views))
+    points = np.bincount(photo, minlength=len(adjusted.views))
     squares = np.bincount(photo, (adjusted.residual_px**2).sum(axis=1), minlength=len(adjusted.views))
-    seen = np.flatnonzero(count)
+    seen = np.flatnonzero(points)
+    told = dict(zip((int(i) for i in seen), adjusted.certainty.relative, strict=True))
     relief = own_relief or adjusted.views[seen[0]].relief
     return Solved(
         views={int(i): replace(adjusted.views[i], relief=relief) for i in seen},
-        matches={int(i): int(count[i]) for i in seen},
-        rms_px={int(i): float(np.sqrt(squares[i] / count[i])) for i in seen},
-        covariance=dict(zip((int(i) for i in seen), adjusted.certainty.relative, strict=True)),
+        matches={int(i): int(points[i]) for i in seen},
+        rms_px={int(i): float(np.sqrt(squares[i] / points[i])) for i in seen},
+        covariance=told if len(seen) >= FEWEST_TOLD else {},
         sigma_scale=adjusted.certainty.scale,
         sigma_px=adjusted.sigma_px,
         edges=tuple(matched),

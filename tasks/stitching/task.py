@@ -219,6 +219,7 @@ def _own_relief(name: str, registered: "Registered", metric: bool) -> Relief | N
     heights, sigma = registered.solved.relief, registered.solved.relief_sigma
     if heights is None or sigma is None or not metric:
         return None
+    seen = heights.seen_by([view.outline_uv for view in registered.solved.views.values()])
     with store.current().scratch() as folder:
         np.save(folder / "heights.npy", heights.w.astype(np.float32))
         np.save(folder / "sigmas.npy", sigma.w.astype(np.float32))
@@ -229,8 +230,8 @@ def _own_relief(name: str, registered: "Registered", metric: bool) -> Relief | N
             left_m=heights.left,
             bottom_m=heights.bottom,
             cell_m=heights.cell,
-            rms_m=float(np.sqrt(np.mean(heights.w**2))),
-            sigma_m=float(np.median(sigma.w)),
+            rms_m=float(np.sqrt(np.mean(heights.w[seen] ** 2))),
+            sigma_m=float(np.median(sigma.w[seen])),
             measured_by="photos",
         )
 

@@ -11,7 +11,7 @@ from tasks.stitching.tracks import Index
 from tasks.stitching.view import Array
 
 CELLS = (4, 3)  # across and down a photo: residuals within one err alike (relief, lens, shutter)
-COSTLESS = 1e-6  # of what heights cost: so little that they hold nothing, and every block has an inverse
+COSTLESS = 1e-3  # of what heights cost: so little that they hold nothing, and every block has an inverse
 FEWEST = 4  # observations that make a cell's mean worth looking at
 
 

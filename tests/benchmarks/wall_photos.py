@@ -29,6 +29,7 @@ from tasks.simulation.photography import Exposure, encode
 from tasks.simulation.scene import Scene
 from tasks.simulation.sensor import automatic_gain, develop
 from tasks.simulation.skin import Skin
+from tasks.stitching.gain import srgb_to_linear
 
 Array = npt.NDArray[np.float64]
 
@@ -87,7 +88,7 @@ class Shown:
 
     px: Array
     uv_m: Array
-    exposed: float  # factor on linear light
+    exposed: float  # factor on linear light, as the file has it
     see: Callable[[Array], Array]  # (N, 2) metres of the wall at any (N, 2) of its pixels
 
 
@@ -136,6 +137,7 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
             velocities[name] = (float(x), float(y), float(z))
         px, see = _grid(true_camera), partial(_seen, true_camera, shot, face, relief)
         truth[name] = Shown(px, see(px), float(gain), see)
+    kept: dict[str, float] = {}  # of the light, by file name: faint texture loses or wins .5 % in a JPEG
     if not said.is_file():
         folder.mkdir(parents=True, exist_ok=True)
         usual = automatic_gain(expose(true_camera, shots[0].pose, shots[0].motion, scene.arrays, scene.look))
@@ -145,10 +147,14 @@ def wall_photos(case: Case, columns: int, rows: int, megapixels: float, seed: in
                 light, true_camera, usual * truth[name].exposed, np.random.default_rng([seed, k])
             )
             (folder / name).write_bytes(_jpeg(pixels, nominal, face, name, poses[name]))
+            kept[name] = _light_of(folder / name) / _mean_light(pixels)
         if case.intruders:
             _intrude(folder, case, true_camera, nominal, face, shots, names, poses, seed)
-        said.write_text(json.dumps(sorted(p.name for p in folder.glob("*.jpg"))))
-    intruders = tuple(n for n in json.loads(said.read_text()) if n not in truth)
+        files = sorted(p.name for p in folder.glob("*.jpg"))
+        said.write_text(json.dumps({name: kept.get(name) for name in files}))
+    kept = json.loads(said.read_text())
+    truth = {name: replace(one, exposed=one.exposed * kept[name]) for name, one in truth.items()}
+    intruders = tuple(name for name in kept if name not in truth)
     for name in intruders:
         poses[name] = poses[names[INTRUDED[name]]]
         velocities[name] = velocities[names[INTRUDED[name]]]
@@ -327,6 +333,16 @@ def _jpeg(pixels: npt.NDArray[np.uint8], camera: Camera, face: Face, name: str, 
     u, v, w = face.to_face(pose.position_m)[0]
     lying = CameraPose(position_m=(float(u), float(v), float(w)), yaw_deg=0.0, pitch_deg=-90.0)
     return encode(pixels, camera, Exposure(name, lying, measured=lying), GPS_ORIGIN)
+
+
+def _light_of(jpeg: Path) -> float:
+    with Image.open(jpeg) as image:
+        return _mean_light(np.asarray(image))
+
+
+def _mean_light(pixels: npt.NDArray[np.uint8]) -> float:
+    """Linear, of green."""
+    return float(srgb_to_linear()[pixels[..., 1]].mean(dtype=np.float64))
 
 
 def _intrude(

@@ -10,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from artifacts import store
+from artifacts.relief_picture import _drawn
 from artifacts.uncertainty_map import _height_sigma_m, _sigmas_mm
 from tasks.stitching import adjustment
 from tasks.stitching.adjustment import Adjusted, adjust
 from tasks.stitching.bundle import ON_SURFACE, Bundle, Spread, State, build_bundle, nominal_lens
 from tasks.stitching.control import Gauge
 from tasks.stitching.heights import Heights
-from tasks.stitching.kriging import relief_of
+from tasks.stitching.kriging import _spacing, relief_of
 from tasks.stitching.mosaicking import _gauged
 from tasks.stitching.normal_equations import _add_priors
 from tasks.stitching.prior import Prior
@@ -167,6 +168,27 @@ def told(noise_m: float, reach_m: tuple[float, float] = (5.0, 4.0)) -> Heights:
 
 def over(low: tuple[float, float], high: tuple[float, float]) -> Array:
     return np.random.default_rng(2).uniform(low, high, (2000, 2))
+
+
+def test_points_along_a_diagonal_lie_as_close_as_along_a_row() -> None:
+    row = np.random.default_rng(1).uniform((0.0, 0.0), (20.0, 1.0), (2000, 2))
+    turned = row @ np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2.0)
+    spacings = [_spacing(at - at.min(axis=0), np.ptp(at, axis=0)) for at in (row, turned)]
+    assert spacings == pytest.approx([0.1, 0.1], rel=0.2)
+
+
+def test_a_relief_knows_where_photos_look() -> None:
+    relief = HeightMap(np.zeros((5, 9)), -1.0, 2.0, 0.5)
+    square = np.array([[0.0, 2.0], [1.0, 2.0], [1.0, 3.0], [0.0, 3.0]])
+    seen = relief.seen_by([square, square + np.array([10.0, 0.0])])
+    assert np.argwhere(seen).min(axis=0).tolist() == [0, 2]
+    assert np.argwhere(seen).max(axis=0).tolist() == [2, 4]
+    assert seen.sum() == 9
+
+
+def test_a_large_relief_is_drawn_small() -> None:
+    picture, _, _ = _drawn(np.zeros((20, 4000), np.float32))
+    assert picture.shape == (4, 900, 3)
 
 
 def test_the_relief_is_surer_than_each_of_its_points() -> None:

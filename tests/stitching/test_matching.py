@@ -113,8 +113,7 @@ def test_averaging_finds_the_ring_and_the_false_edge() -> None:
     views, features, edges = ring(12)
     false = Edge(0, 6, np.column_stack([np.arange(25), np.arange(25)]))
     guess = average([*edges, false], features, [unknown(v) for v in views], np.zeros(3))
-    assert [(e.a, e.b) for e in guess.false] == [(0, 6)]
-    assert len(guess.edges) == len(edges)
+    assert [(e.a, e.b) for e in guess.edges] == [(e.a, e.b) for e in edges]
     found = np.array([v.centre_uv @ [1, 1j] for v in guess.views])
     true = np.array([v.centre_uv @ [1, 1j] for v in views])
     columns = np.column_stack([found, np.ones(12)])

@@ -23,6 +23,7 @@ from tests.stitching.test_on_relief import waves
 
 Array = npt.NDArray[np.float64]
 POINTS = 6000
+PLAIN = CAMERA.model_copy(update={"k1": 0.0})
 NEAR_M = 0.01  # the plane: such points a homography carries
 
 
@@ -44,8 +45,7 @@ def shown(true: list[View]) -> tuple[list[PhotoFeatures], list[Edge]]:
         taken = view.to_photo(uv) + rng.normal(0, 0.3, uv.shape)
         seen = np.flatnonzero(((taken > 0) & (taken < [1599, 1199])).all(axis=1))
         ideal = (taken[seen] - CAMERA.principal_px) / CAMERA.focal_px
-        plain = CAMERA.model_copy(update={"k1": 0.0})
-        xy = plain.undistort(ideal) * CAMERA.focal_px + CAMERA.principal_px
+        xy = PLAIN.undistort(ideal) * CAMERA.focal_px + CAMERA.principal_px
         none = np.zeros(len(seen), np.float32)
         features.append(PhotoFeatures(xy.astype(np.float32), none, none, descriptors[seen]))
         which.append(seen)
@@ -121,6 +121,19 @@ def test_no_relief_costs_a_photo(again: Callable[[Adjusting], Adjusting]) -> Non
     first, own = followed(3.0, again)
     assert own.adjusted is first
     assert np.median(own.sigma.w) < 0.01
+
+
+def test_points_seen_from_nearly_one_place_tell_no_height() -> None:
+    """Two photos 3 mm apart, as a vehicle that hovers takes them: a point may be half a metre off."""
+    first, _ = followed(3.0, lambda _: lambda *_: None)
+    assert first.heights is not None
+    hovering = [first.views[0], replace(first.views[0], C=first.views[0].C + np.array([0.003, 0.0, 0.0]))]
+    views = [*hovering, first.views[1]]
+    features, edges = shown([replace(view, camera=CAMERA, relief=rough()) for view in views])
+    twice = replace(first, views=tuple(replace(view, camera=CAMERA) for view in views))
+    heights = own_relief._heights(twice, edges, features)
+    assert len(heights.w) > 30
+    assert heights.sigma.max() < first.heights.usual
 
 
 def _shift(adjusted: Adjusted) -> Array:
