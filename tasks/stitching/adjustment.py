@@ -24,6 +24,7 @@ from tasks.stitching.bundle import (
     height_squares,
     height_weight,
     linearise,
+    met,
     nominal_lens,
     prior_errors,
     residuals,
@@ -97,10 +98,9 @@ def adjust(
             bundle = replace(bundle, spread=spread)
             X, w = points(state, bundle, sigma)
             state = replace(state, X=X, w=w)
-            faced = np.asarray(np.isfinite(residuals(state, bundle)).all(axis=1))
-            if faced.all():
+            if (seen_well := met(state, bundle)).all():
                 break
-            current = current.where(faced)  # a camera has turned its back on the others
+            current = current.where(seen_well)
         state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
         weight, trust = _robust(residual, sigma), _trust(state, bundle)
         variance = noise(bundle, residual, weight)

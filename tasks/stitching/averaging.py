@@ -70,9 +70,7 @@ class _Similarity:
     weight: float
 
 
-def _similarity(
-    edge: Edge, features: Sequence[PhotoFeatures], views: Sequence[View]
-) -> _Similarity | None:
+def _similarity(edge: Edge, features: Sequence[PhotoFeatures], views: Sequence[View]) -> _Similarity | None:
     """None where hardly any of the matches lies below both photos' horizons."""
     qa = views[edge.a].to_plane(features[edge.a].xy[edge.matches[:, 0]])
     qb = views[edge.b].to_plane(features[edge.b].xy[edge.matches[:, 1]])

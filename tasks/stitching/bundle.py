@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from schemas.camera import Camera
 from tasks.stitching.derivatives import differentiate
@@ -23,6 +24,7 @@ K1_AT_EDGE, CENTRE = {True: 0.002, False: 0.03}, {True: 0.0005, False: 0.005}
 ALIKE = 25.0  # so many points are taken to err alike (relief, shutter, lens), and to lie as high
 HELD_HEIGHT = 1e-9  # 1σ, plane units, of points that lie on the surface
 LEAST_HEIGHT = 0.1  # RMS, of what it was before
+HORIZON = 50.0  # times farther away than a camera is from the surface, points tell nothing of it
 HELD = 0.01  # 1σ, of its distance and in radians, of the photo that holds a bundle without positions
 
 
@@ -187,6 +189,13 @@ def _ideal(state: State, bundle: Bundle) -> tuple[Array, Array]:
     in_camera = np.einsum("mji,mj->mi", R, offset)
     z = np.where(in_camera[:, 2] > 1e-9, in_camera[:, 2], np.nan)
     return in_camera[:, :2] / z[:, None], in_camera
+
+
+def met(state: State, bundle: Bundle) -> npt.NDArray[np.bool_]:
+    """(M,) whose points lie before their cameras, and not so far off that these look along the surface."""
+    _, in_camera = _ideal(state, bundle)
+    depth, height = in_camera[:, 2], state.C[bundle.photo, 2]
+    return np.asarray((depth > 1e-9) & (depth < HORIZON * height))
 
 
 def residuals(state: State, bundle: Bundle) -> Array:

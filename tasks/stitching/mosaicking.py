@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +19,11 @@ from tasks.stitching.gain import solve_light
 from tasks.stitching.nadir import borne_out
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.placement import Fate, fates, unusable
-from tasks.stitching.prior import placeless, plane_frame
+from tasks.stitching.prior import PlaneFrame, placeless, plane_frame
 from tasks.stitching.relief import HeightMap
 from tasks.stitching.seams import darkness
 from tasks.stitching.solution import Solved, neighbours, solve
+from tasks.stitching.strangers import strangers
 from tasks.stitching.view import Array
 
 NOTHING: Sightings = {}
@@ -41,7 +43,7 @@ class Registered:
     scale_from: str
     pairs: tuple[tuple[int, int], ...]  # neighbours among the photos that are in the mosaic
     control: tuple[ControlResidual, ...] = ()
-    control_left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()  # of control and positions: what was not used
 
     @property
     def shown(self) -> list[int]:
@@ -64,16 +66,11 @@ def register_photos(
     bad = unusable(photos, settings.min_sharpness)
     good = [i for i in range(len(photos)) if i not in bad]
     kept, kept_features = [photos[i] for i in good], [features[i] for i in good]
-    frame = plane_frame(kept, surface)
-    pairs = neighbours(kept_features, frame)
-    sigmas = [p.focal_sigma for p in kept]
-    if frame.surface is None:
-        relief = None
-    solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress, relief)
-    if frame.view_guessed and not borne_out(frame.priors, solved.views, solved.sigma_scale):
-        frame = placeless(kept)
-        pairs = neighbours(kept_features, frame)
-        solved = solve(kept_features, frame, sigmas, pairs, settings.ransac_px, on_progress)
+    away_m = strangers(kept)
+    kept = [
+        p.model_copy(update={"pose": None, "gps": None}) if i in away_m else p for i, p in enumerate(kept)
+    ]
+    frame, pairs, solved = _solved(kept, kept_features, surface, settings, on_progress, relief)
     found = fates(frame, solved.views, kept_features)
     if len(kept) == 1 and found[0].view is None:
         found = [
@@ -117,7 +114,57 @@ def register_photos(
         scale_from,
         among,
         residuals,
-        (*left_out, *doubts),
+        (
+            *left_out,
+            *doubts,
+            *(_misplaced(kept[i].name, metres) for i, metres in away_m.items()),
+            *((_untold(name),) if scale_from == "none" and any(p.gps for p in kept) else ()),
+        ),
+    )
+
+
+class _Solution(NamedTuple):
+    frame: PlaneFrame
+    pairs: list[tuple[int, int]]
+    solved: Solved
+
+
+def _solved(
+    photos: Sequence[Photo],
+    features: Sequence[PhotoFeatures],
+    surface: Surface | None,
+    settings: StitchSettings,
+    on_progress: Callable[[float], None],
+    relief: HeightMap | None,
+) -> _Solution:
+    """By what is known of their positions; without, where these are not borne out or lead to nothing."""
+
+    def in_frame(frame: PlaneFrame, relief: HeightMap | None) -> _Solution:
+        pairs, sigmas = neighbours(features, frame), [photo.focal_sigma for photo in photos]
+        solved = solve(features, frame, sigmas, pairs, settings.ransac_px, on_progress, relief)
+        return _Solution(frame, pairs, solved)
+
+    frame = plane_frame(photos, surface)
+    first = in_frame(frame, None if frame.surface is None else relief)
+    if frame.surface is not None or frame.scale_from == "none":
+        return first
+    wrong = frame.view_guessed and not borne_out(frame.priors, first.solved.views, first.solved.sigma_scale)
+    if first.solved.views and not wrong:
+        return first
+    blind = in_frame(placeless(photos), None)
+    return blind if blind.solved.views or wrong else first
+
+
+def _misplaced(name: str, metres: float) -> LeftOut:
+    away = f"{metres / 1000:.4g} km" if metres >= 1000 else f"{metres:.0f} m"
+    what = f"its stated position lies {away} from those of all other photos: it was not used"
+    return LeftOut(item=name, stage="stitch", what=what, remedy="Check the position in the photo's header")
+
+
+def _untold(name: str) -> LeftOut:
+    what = "its scale is not known: the photos' GPS positions do not fit what they show, or do not tell it"
+    return LeftOut(
+        item=name, stage="stitch", what=what, remedy="Give targets, a scale bar, poses or gsd_mm_px"
     )
 
 

@@ -8,10 +8,13 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from tasks.stitching.view import Array
 
+LEAST_PIVOT = 1e-14  # of an unknown's own diagonal: less is rounding
+
 
 def solve_positive(A: Array, b: Array, shared: int = 0) -> Array:
     """x of A x = b for a symmetric positive definite (N, N) A and (N,) or (N, K) b, ordered to a narrow band
-    first. The last `shared` unknowns touch all others and stay last.
+    first. The last `shared` unknowns touch all others and stay last. What A leaves undetermined but for
+    rounding hardly holds, and so moves far.
 
     Raises np.linalg.LinAlgError where A is not positive definite."""
     own = len(b) - shared
@@ -39,10 +42,10 @@ def _factor_and_solve(A: Array, first: Array, x: Array) -> bool:
                 total -= A[i, k] * A[j, k]
             if j < i:
                 A[i, j] = total / A[j, j]
-            elif total <= 0.0:
+            elif not A[i, i] > 0.0:
                 return False
             else:
-                A[i, i] = np.sqrt(total)
+                A[i, i] = np.sqrt(max(total, LEAST_PIVOT * A[i, i]))
     for i in range(n):
         for k in range(first[i], i):
             if A[i, k] != 0.0:

@@ -144,7 +144,7 @@ def stitch(
             if p.status == "rejected"
         )
         + not_there
-        + registered.control_left_out,
+        + registered.left_out,
         control=registered.control,
     )
 

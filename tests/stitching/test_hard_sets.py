@@ -4,6 +4,7 @@ scan that measured a hedge. Nothing may crash, and what is good must stay."""
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +14,9 @@ from schemas.camera import Camera, CameraPose
 from schemas.file import File
 from schemas.photo import Photo
 from schemas.settings import StitchSettings
+from tasks.stitching import mosaicking
 from tasks.stitching.adjustment import adjust
-from tasks.stitching.mosaicking import register_photos
+from tasks.stitching.mosaicking import Registered, register_photos
 from tasks.stitching.pairs import PhotoFeatures
 from tasks.stitching.prior import PlaneFrame, Prior
 from tasks.stitching.relief import HeightMap
@@ -65,23 +67,26 @@ def shown(views: Sequence[View], uv: Array) -> list[PhotoFeatures]:
     return [features(view.to_photo(uv) + rng.normal(0, 0.3, uv.shape), view.camera, look) for view in views]
 
 
-@pytest.mark.parametrize("pitch_deg", [-15.0, -20.0])
-def test_photos_of_the_horizon_leave_the_others_alone(pitch_deg: float) -> None:
-    """Twelve photos of the ground by GPS, and two into the distance, 30 cm apart."""
-    camera = Camera(width_px=1600, height_px=1200, focal_px=1300.0)
-    rng = np.random.default_rng(0)
-    ground = np.column_stack([rng.uniform([-20, -20], [40, 60], (9000, 2)), np.zeros(9000)])
-    hills = np.column_stack([rng.uniform(-400, 400, 3000), np.full(3000, 500.0), rng.uniform(0, 150, 3000)])
-    places, look = rng.permutation(np.concatenate([ground, hills])), looks(12000)
-    shots = [
+WIDE = Camera(width_px=1600, height_px=1200, focal_px=1300.0)
+GROUND = np.random.default_rng(7).uniform([-20, -20, 0], [40, 60, 0], (9000, 3))
+
+
+def over_ground(rng: np.random.Generator) -> list[tuple[float, float, float]]:
+    """Twelve shots: metres east and north, pitch in degrees."""
+    return [
         (6.0 * (k % 4) + rng.normal(0, 0.3), 5.0 * (k // 4) + rng.normal(0, 0.3), -90.0 + rng.normal())
         for k in range(12)
     ]
-    shots += [(8.0, -5.0, pitch_deg), (8.3, -5.0, pitch_deg)]
-    photos, given = [], []
+
+
+def by_gps(
+    shots: Sequence[tuple[float, float, float]], places: Array, rng: np.random.Generator
+) -> tuple[list[Photo], list[PhotoFeatures]]:
+    """Photos from 20 m, as their headers tell: half a metre off."""
+    photos, given, look = [], [], looks(len(places))
     for k, (x, y, pitch) in enumerate(shots):
         pose = CameraPose(position_m=(x, y, 20.0), yaw_deg=0.0, pitch_deg=pitch)
-        given.append(features(camera.project(places, pose) + rng.normal(0, 0.3, (12000, 2)), camera, look))
+        given.append(features(WIDE.project(places, pose) + rng.normal(0, 0.3, (len(places), 2)), WIDE, look))
         north, east = y + rng.normal(0, 0.5), x + rng.normal(0, 0.5)
         at = (
             48 + np.degrees(north / 6371000),
@@ -92,7 +97,7 @@ def test_photos_of_the_horizon_leave_the_others_alone(pitch_deg: float) -> None:
             Photo(
                 name=f"p{k:02d}.jpg",
                 file=File(sha256=f"{k:064x}", size=10, suffix=".jpg"),
-                camera=camera,
+                camera=WIDE,
                 position_sigma_m=1.0,
                 gps=at,
                 view_deg=(0.0, pitch, 0.0),
@@ -101,9 +106,51 @@ def test_photos_of_the_horizon_leave_the_others_alone(pitch_deg: float) -> None:
                 exposure=0.5,
             )
         )
-    found = register_photos("s", None, photos, given, StitchSettings(), lambda _: None)
+    return photos, given
+
+
+def registered(photos: list[Photo], given: list[PhotoFeatures]) -> Registered:
+    return register_photos("s", None, photos, given, StitchSettings(), lambda _: None)
+
+
+@pytest.mark.parametrize("pitch_deg", [-15.0, -20.0])
+def test_photos_of_the_horizon_leave_the_others_alone(pitch_deg: float) -> None:
+    """Twelve photos of the ground by GPS, and two into the distance, 30 cm apart."""
+    rng = np.random.default_rng(0)
+    hills = np.column_stack([rng.uniform(-400, 400, 3000), np.full(3000, 500.0), rng.uniform(0, 150, 3000)])
+    shots = [*over_ground(rng), (8.0, -5.0, pitch_deg), (8.3, -5.0, pitch_deg)]
+    found = registered(*by_gps(shots, rng.permutation(np.concatenate([GROUND, hills])), rng))
     assert [fate.status for fate in found.fates[:12]] == ["solved"] * 12
     assert "solved" not in [fate.status for fate in found.fates[12:]]
+
+
+@pytest.mark.parametrize("away_deg", [0.003, 0.05, 30.0])
+def test_a_photo_that_bears_a_strange_position_is_matched_by_its_picture(away_deg: float) -> None:
+    rng = np.random.default_rng(1)
+    photos, given = by_gps(over_ground(rng), GROUND, rng)
+    latitude, longitude, height = photos[5].gps or (0.0, 0.0, 0.0)
+    photos[5] = photos[5].model_copy(update={"gps": (latitude - away_deg, longitude, height)})
+    found = registered(photos, given)
+    assert [fate.status for fate in found.fates] == ["solved"] * 12
+    assert found.solved.sigma_scale < 0.1
+    (word,) = found.left_out
+    assert word.item == "p05.jpg"
+    assert "was not used" in word.what
+
+
+def test_positions_that_lead_to_nothing_are_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where two photos of a set have one, and both come loose; that the scale is lost is said."""
+
+    def solve_without_positions(given: list[PhotoFeatures], frame: PlaneFrame, *known: Any) -> Solved:
+        return solve(given, frame, *known) if frame.scale_from == "none" else nothing
+
+    nothing = Solved({}, {}, {}, {}, 0.0, 0.0, (), frozenset())
+    monkeypatch.setattr(mosaicking, "solve", solve_without_positions)
+    rng = np.random.default_rng(2)
+    found = registered(*by_gps(over_ground(rng), GROUND, rng))
+    assert [fate.status for fate in found.fates] == ["solved"] * 12
+    assert found.scale_from == "none"
+    assert ["scale is not known" in word.what for word in found.left_out] == [True]
 
 
 def test_a_weak_chain_that_comes_loose_link_by_link_leaves_the_others() -> None:

@@ -1,0 +1,45 @@
+"""Positions that cannot be right: a photo whose GPS had no fix yet, or that bears another's position."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from schemas.geodesy import GeoOrigin
+from schemas.photo import Photo
+from tasks.stitching.view import Array
+
+FEWEST = 5  # photos with positions that can outvote one
+ALONE = 10.0  # times farther from the nearest than three quarters of the photos are
+SIGMAS = 10.0  # and so many of the positions' error
+MOST = 0.25  # share of the photos: more are no strangers, but another part of the structure
+
+
+def strangers(photos: Sequence[Photo]) -> dict[int, float]:
+    """Metres from the nearest other photo, of those that lie far from all: farther than the others are
+    spread, or many times farther than most of these from their nearest."""
+    which, at = _positions(photos)
+    if len(which) < FEWEST:
+        return {}
+    nearest = cKDTree(at).query(at, k=2)[0][:, 1]
+    usual = float(np.percentile(nearest, 75))
+    suspect = np.flatnonzero(nearest > SIGMAS * max(photos[i].position_sigma_m for i in which))
+    found = {}
+    for k in suspect:
+        spread = float(np.linalg.norm(np.ptp(np.delete(at, k, axis=0), axis=0)))
+        if nearest[k] > min(ALONE * usual, spread):
+            found[which[k]] = float(nearest[k])
+    return found if len(found) <= MOST * len(which) else {}
+
+
+def _positions(photos: Sequence[Photo]) -> tuple[list[int], Array]:
+    """Which photos have one, and (n, 3) metres: poses where there are any, else east and north by GPS."""
+    posed = [i for i, photo in enumerate(photos) if photo.pose is not None]
+    if posed:
+        return posed, np.array([pose.position_m for i in posed if (pose := photos[i].pose) is not None])
+    located = [(i, photo.gps) for i, photo in enumerate(photos) if photo.gps is not None]
+    if not located:
+        return [], np.zeros((0, 3))
+    latitude, longitude, _ = np.median([gps for _, gps in located], axis=0)
+    origin = GeoOrigin(latitude_deg=float(latitude), longitude_deg=float(longitude))
+    return [i for i, _ in located], np.array([origin.to_enu(g[0], g[1], 0.0) for _, g in located])
