@@ -24,6 +24,7 @@ from tests.development_data import ROOT
 METHODS = ("hairline", "ridge")
 WIDTHS_PX, DEPTHS_RMS = (1.0, 2.5, 4.0, 8.0), (1.5, 3.0, 5.0, 10.0)
 SEEDS = range(700, 705)
+VIEWED = range(700, 717)  # in other light and at other scales: a single wall may lose a third of its crack
 NEAR_PX = 5  # between centrelines
 GSD_MM_PX = PX_M * 1000
 PHOTOS = 20
@@ -75,7 +76,7 @@ def uneven_light() -> Iterator[Row]:
     for method in METHODS:
         even, shaded, marked, dappled = [], [], [], []
         along_edge_px = of_leaves_px = 0
-        for seed in SEEDS:
+        for seed in VIEWED:
             wall = cracked_wall(seed, 3.0, 8.0)
             even.append(count(found_on(wall.rgb, method, GSD_MM_PX), wall.truth, 2))
             dark = cracked_wall(seed, 3.0, 8.0, shade=0.4)
@@ -92,7 +93,7 @@ def uneven_light() -> Iterator[Row]:
             of_leaves_px += int((centreline(found) & far).sum())
         f1 = [scores(_summed(counts)).f1 for counts in (even, shaded, marked, dappled)]
         bar = "≤ 0.02" if method == "hairline" else None
-        data, seed_text = f"{len(SEEDS)} simulated walls, crack of 3 px", f"{SEEDS[0]}…"
+        data, seed_text = f"{len(VIEWED)} simulated walls, crack of 3 px", f"{VIEWED[0]}…"
         yield row(
             f"F1 lost to a shadow, one half at 40 %: {method}", f1[0] - f1[1], "1", bar, data, seed_text
         )
@@ -107,7 +108,7 @@ def scales() -> Iterator[Row]:
     """The same photo at half and twice its size: the same cracks."""
     for method in METHODS:
         away, longer = [], []
-        for seed in SEEDS:
+        for seed in VIEWED:
             wall = cracked_wall(seed, 6.0, 10.0)
             at_one = found_on(wall.rgb, method, GSD_MM_PX)
             for factor in (0.5, 2.0):
@@ -126,7 +127,7 @@ def scales() -> Iterator[Row]:
                 away.append(float(np.percentile(apart, 95)))
                 longer.append(abs(float(lines[0].sum() / lines[1].sum()) - 1.0))
         bars = ("≤ 2", "≤ 5") if method == "hairline" else (None, None)
-        data, seed_text = f"{len(SEEDS)} simulated walls, crack of 6 px, at 0.5 and 2 times", f"{SEEDS[0]}…"
+        data, seed_text = f"{len(VIEWED)} simulated walls, crack of 6 px, at 0.5 and 2 times", f"{VIEWED[0]}…"
         yield row(f"place at other scales, P95: {method}", max(away), "px", bars[0], data, seed_text)
         yield row(f"length at other scales: {method}", 100 * max(longer), "%", bars[1], data, seed_text)
 
