@@ -171,14 +171,14 @@ def _untold(name: str) -> LeftOut:
 def _contradicted(
     name: str, gauge: Gauge, known_from: str, solved: Solved, usual_gsd_m: float
 ) -> tuple[LeftOut, ...]:
-    """A word where the scale that somebody stated is quite another than the one that GPS tells."""
+    """A word where the scale that somebody stated is quite another than the one that positions tell."""
     sigma = solved.sigma_scale
-    if known_from != "GPS" or not np.isfinite(sigma):
+    if known_from == "none" or not np.isfinite(sigma):
         return ()
     if abs(np.log(gauge.scale)) < max(np.log(WRONG), DOUBTED * sigma):
         return ()
     told, stated = 1000.0 * usual_gsd_m, 1000.0 * gauge.scale * usual_gsd_m
-    what = f"its scale is {stated:.3g} mm/px by {gauge.scale_from}, {told:.3g} (± {100 * sigma:.2g} %) by GPS"
+    what = f"its scale is {stated:.3g} mm/px by {gauge.scale_from}, {told:.3g} (± {100 * sigma:.2g} %) by {known_from}"
     remedy = "One of them is wrong: every length and width hangs on it"
     return (LeftOut(item=name, stage="stitch", what=what, remedy=remedy),)
 

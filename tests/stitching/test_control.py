@@ -9,7 +9,9 @@ from schemas.control import Control, PlaneTarget, ScaleBar
 from schemas.mosaic import Mosaic
 from schemas.problem import BadInput
 from schemas.settings import StitchSettings
-from tasks.stitching.control import Mark, fix_gauge, judged
+from tasks.stitching.control import Gauge, Mark, fix_gauge, judged
+from tasks.stitching.mosaicking import _contradicted
+from tasks.stitching.solution import Solved
 from tasks.stitching.tags import find_tags
 from tasks.stitching.task import stitch
 from tests.stitching.photo_sets import SETTINGS, PhotoSet, errors_px
@@ -187,3 +189,17 @@ def test_marks_name_a_photo_by_its_file_where_no_other_is_called_so(wall: PhotoS
     assert mosaic.gsd_mm_px == pytest.approx(surveyed.gsd_mm_px, rel=0.002)
     unclear = {left.what for left in mosaic.left_out if left.item.startswith("mark ")}
     assert unclear == {f"there is no readable photo {bare.photos[0].name} in this set"}
+
+
+@pytest.mark.parametrize(
+    ("known_from", "sigma", "words"),
+    [("poses", 0.05, 1), ("GPS", 0.05, 1), ("GPS", 0.3, 0), ("none", 0.05, 0)],
+)
+def test_a_stated_scale_that_positions_contradict_is_doubted(
+    known_from: str, sigma: float, words: int
+) -> None:
+    solved = Solved({}, {}, {}, {}, sigma, 0.0, (), frozenset())
+    doubts = _contradicted("wall", Gauge(2.0, 0.0, np.zeros(2), "stated GSD"), known_from, solved, 0.001)
+    assert len(doubts) == words
+    for doubt in doubts:
+        assert doubt.what == f"its scale is 2 mm/px by stated GSD, 1 (± 5 %) by {known_from}"
