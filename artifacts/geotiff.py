@@ -9,6 +9,7 @@ from typing import Any
 import tifffile
 
 SCALE, TRANSFORMATION, NODATA = 33550, 34264, 42113  # ModelPixelScale, ModelTransformation, GDAL_NODATA
+SOFTWARE = "hairline"  # in the tag Software of what it writes
 PROJECTED, WEB_MERCATOR = 1, 3857  # of GTModelType; a map whose metres are none but on the equator
 METRES = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}  # of ProjLinearUnits (EPSG)
 ALPHA = (1, 2)  # of ExtraSamples: transparency, premultiplied or not; any other is a band more
@@ -39,6 +40,16 @@ def told_by(path: Path) -> Told | None:
                 _gsd_mm_px(page),
                 None if nodata is None else _level(nodata.value),
             )
+    except (OSError, ValueError, IndexError, KeyError, TypeError, struct.error, tifffile.TiffFileError):
+        return None
+
+
+def made_here(path: Path) -> int | None:
+    """Channels of a mosaic, coverage or source that Hairline wrote; None for any other file."""
+    try:
+        with tifffile.TiffFile(path) as file:
+            page: Any = file.pages[0]
+            return int(page.samplesperpixel) if page.software == SOFTWARE else None
     except (OSError, ValueError, IndexError, KeyError, TypeError, struct.error, tifffile.TiffFileError):
         return None
 

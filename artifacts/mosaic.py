@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import tifffile
 
-from artifacts.geotiff import NODATA, SCALE
+from artifacts.geotiff import NODATA, SCALE, SOFTWARE
 
 TILE_PX = 256
 CLASSIC_LIMIT = 3_500_000_000  # raw bytes from which on the file is a BigTIFF
@@ -150,7 +150,7 @@ class TiledTiff:
                     predictor=2 if self._channels else None,
                     photometric="rgb" if self._channels else "minisblack",
                     description=self._place.description if first else None,
-                    software="hairline" if first else None,
+                    software=SOFTWARE if first else None,
                     metadata=None,
                     resolution=None if per_cm is None else (per_cm, per_cm),
                     resolutionunit=None if per_cm is None else "CENTIMETER",

@@ -23,7 +23,7 @@ from schemas.surface import Surface
 from tasks.detection.task import detect
 from tasks.measurement.task import measure
 from tasks.patterns.task import remove_patterns
-from tasks.photos.task import features, ingest
+from tasks.photos.task import features, fit_alone, ingest
 from tasks.stitching.task import single, stitch
 from tasks.surfaces.task import measure_relief
 
@@ -73,7 +73,8 @@ def detect_in_photos(
     taken = ingest.each(
         (s.file, s.name, s.surface, s.camera, s.pose, s.position_sigma_m, s.velocity_m_s) for s in sources
     )
-    photos = usable("photos", list(sources), taken)
+    read = usable("photos", list(sources), taken)
+    photos = [(source, photo) for (source, _), photo in usable("photos", read, _inspectable(read))]
     problems.extend(_control_of_nothing(inspection, {s.surface for s, _ in photos if s.stitch}))
     mosaics = _mosaics(inspection, photos, surfaces, modelled)
     mosaics = [m for _, m in usable("stitching", [None] * len(mosaics), mosaics)]
@@ -85,6 +86,12 @@ def detect_in_photos(
     found = usable("detection", cleaned, detect.each((m, p, settings, network) for m, p in cleaned))
     measured = usable("measurement", found, measure.each((m, p, d, inspection.detect) for (m, p), d in found))
     return Detected(tuple(Inspected(m, p, d, cracks) for ((m, p), d), cracks in measured), tuple(problems))
+
+
+def _inspectable(photos: Sequence[tuple[PhotoSource, Photo]]) -> list[Photo | BadInput]:
+    """Those that stand for themselves are judged here; `stitch` judges those of a surface by each other."""
+    alone = iter(fit_alone([photo for source, photo in photos if not source.stitch]))
+    return [photo if source.stitch else next(alone) for source, photo in photos]
 
 
 def _control_of_nothing(inspection: Inspection, names: set[str]) -> list[LeftOut]:

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from flows.command_line import app
+from flows.console import err
 from flows.console import out as console
 from flows.option_types import Gsd
 from flows.photo_commands import Method
@@ -73,6 +74,9 @@ def evaluate(
     console.print(as_table(result.evaluations))
     console.print(f"{result.evaluations[0].images} images: {out / 'evaluation.json'}, {out / 'worst'}")
     warn(result.left_out)
+    if not result.drawn_px:
+        text = f"Warning: no mask in {masks} marks any crack: precision, recall and F1 say nothing"
+        err.print(text, style="yellow", markup=False)
 
 
 class Judged(NamedTuple):
@@ -89,6 +93,7 @@ class Comparison(NamedTuple):
     curves: Curves | None  # where the network is one of the methods
     worst: list[Judged]
     left_out: list[LeftOut]  # images that could not be used
+    drawn_px: int  # that the masks mark as crack, in all
 
 
 def compare(
@@ -107,6 +112,7 @@ def compare(
     tallies: dict[str, list[Tally]] = {name: [] for name in methods}
     worst: list[Judged] = []
     of_all: Levels | None = None
+    drawn_px = 0
     problems = []
     paths = photos_in(images)
     for number, path in enumerate(paths, start=1):
@@ -121,6 +127,7 @@ def compare(
                 tallies[name].append(tally(mask, truth))
             first = next(iter(methods))
             judged = Judged(path, truth, of_methods[first], f1_of(tallies[first][-1], TOLERANCE_PX))
+            drawn_px += int(truth.sum())
             worst = sorted([*worst, judged], key=lambda one: one.f1)[:WORST]
         except BadInput as problem:
             problems.append(problem)
@@ -132,6 +139,7 @@ def compare(
         None if of_all is None else curves(of_all, TOLERANCE_PX),
         worst,
         [LeftOut.because("evaluation", problem) for problem in problems],
+        drawn_px,
     )
 
 

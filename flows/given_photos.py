@@ -7,6 +7,7 @@ from pathlib import Path
 
 from artifacts import store
 from flows.inspection_file import existing
+from flows.photo_files import photo_files
 from schemas.camera import Camera, CameraPose
 from schemas.contract import Vector3
 from schemas.file import File, FolderEntry
@@ -14,8 +15,6 @@ from schemas.flight_log import FlightLog
 from schemas.inspection import Inspection, PhotoSet
 from schemas.problem import BadInput, LeftOut
 from tasks.photos.task import assign
-
-PHOTO_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".heic", ".heif"}
 
 
 @dataclass(frozen=True)
@@ -37,12 +36,16 @@ def given_photos(
     inspection: Inspection, base: Path, log: FlightLog | None
 ) -> tuple[list[PhotoSource], list[LeftOut]]:
     """The photos in the inspection's folders; those of a logged flight with their surface and pose. And the
-    files that cannot be read; BadInput where none can.
+    files that cannot be read, or are not taken; BadInput where none can.
 
     A photo is called by its file's name; where several folders have one of that name, by folder/name."""
     camera = inspection.camera.camera() if inspection.camera else None
     folders = [existing(base, photo_set.folder, "photos").resolve() for photo_set in inspection.photos]
-    paths = [_photos_in(folder, s.folder) for folder, s in zip(folders, inspection.photos, strict=True)]
+    listed = [
+        photo_files(folder, s.folder, others=folders)
+        for folder, s in zip(folders, inspection.photos, strict=True)
+    ]
+    paths = [one.paths for one in listed]
     bearers = Counter(path.name for of_folder in paths for path in of_folder)
     found: list[tuple[PhotoSet, str, Path, File]] = []
     problems: list[BadInput] = []
@@ -72,24 +75,12 @@ def given_photos(
                 velocity_m_s=shot.velocity_m_s if shot else None,
             )
         )
-    return sources, [LeftOut.because("photos", problem) for problem in problems]
+    not_taken = [left for one in listed for left in one.not_taken]
+    return sources, [*not_taken, *(LeftOut.because("photos", problem) for problem in problems)]
 
 
 def position_sigma_m(inspection: Inspection) -> float:
     return float((inspection.vehicle.position_bias_m**2 + inspection.vehicle.position_jitter_m**2) ** 0.5)
-
-
-def is_photo_file(path: Path) -> bool:
-    """Also a link to nothing: it is named among what is left out, not passed over."""
-    return path.is_file() or path.is_symlink()
-
-
-def _photos_in(folder: Path, stated: str) -> list[Path]:
-    photos = folder.iterdir() if folder.is_dir() else ()
-    paths = sorted(p for p in photos if p.suffix.lower() in PHOTO_SUFFIXES and is_photo_file(p))
-    if not paths:
-        raise BadInput(stated, "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
-    return paths
 
 
 def _labels(folders: Sequence[Path]) -> list[str]:

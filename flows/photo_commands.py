@@ -1,11 +1,12 @@
 """`hairline stitch`, `detect` and `measure`: from photos to cracks, on plain files."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
 
 from flows.command_line import app
-from flows.console import err
+from flows.console import err, plain
 from flows.option_types import Gsd, of_options
 from flows.plain_files import (
     OutFolder,
@@ -13,6 +14,7 @@ from flows.plain_files import (
     photos_in,
     read_camera,
     read_control,
+    refuse_unless_file,
     say,
     warn,
     working,
@@ -73,11 +75,12 @@ def stitch(
         settings = StitchSettings(gsd_mm_px=gsd_mm_px)
         described = tuple(features.bare(photo, settings) for photo in photos)
         mosaic = stitch_photos.bare(name, None, tuple(photos), described, settings, known)
+        mosaic = mosaic.model_copy(update={"left_out": (*left_out, *mosaic.left_out)})
         write_mosaic(out, mosaic, copy=True)
     counts = {s: sum(p.status == s for p in mosaic.placements) for s in ("solved", "placed", "rejected")}
     say(", ".join(f"{count} {status}" for status, count in counts.items()) + f": {out / 'mosaic.tif'}")
     say(mosaic.gauge)
-    warn([*left_out, *mosaic.left_out])
+    warn(mosaic.left_out)
     _warn_of_assumed(photos)
 
 
@@ -90,11 +93,7 @@ def _warn_of_assumed(photos: "list[Photo]") -> None:
             " where photos are tilted. State it: a file with width_px, height_px and focal_px (or focal_mm"
             " and sensor_width_mm) as --camera; hairline calibrate makes one from photos of a chessboard"
         )
-        err.print(f"[yellow]{_escaped(text)}[/yellow]")
-
-
-def _escaped(text: str) -> str:
-    return text.replace("[", r"\[")
+        err.print(f"[yellow]{plain(text)}[/yellow]")
 
 
 @app.command
@@ -130,15 +129,15 @@ def detect(
     min_score:
         Least probability, 0 to 1, that what a network found is a crack. A lower one finds more and errs more.
     """
-    from artifacts.run_folder import lay_out
+    from artifacts.run_folder import lay_out, safe_name
     from flows.results import write_json
     from schemas.settings import AssessSettings, DetectSettings
     from tasks.assessment.task import assess
 
     if (method == "onnx") != (model is not None):
         raise BadInput("--model", "goes with --method onnx, and only with it", "Give both or neither")
-    if model is not None and not model.is_file():
-        raise BadInput(str(model), "no such file", "Correct the path")
+    if model is not None:
+        refuse_unless_file(model)
     settings = of_options(
         DetectSettings,
         method=method,
@@ -148,13 +147,16 @@ def detect(
     )
     seen: list[Detected] = []
     problems: list[BadInput] = []
-    paths = photos_in(images)
+    masks: set[str] = set()
+    paths = photos_in(images, mosaics=True)
     with working(out) as progress:
         for number, path in enumerate(paths, start=1):
             try:
-                seen.append(detected(path, settings, gsd_mm_px, model))
+                before = [photo for one in seen for photo in one.mosaic.photos]
+                seen.append(detected(path, settings, gsd_mm_px, model, before))
                 name = path.stem if [p.stem for p in paths].count(path.stem) == 1 else path.name
                 lay_out(out, {f"{name}.mask.png": seen[-1].detection.mask}, copy=True)
+                masks.add(safe_name(f"{name}.mask.png"))
             except BadInput as problem:
                 problems.append(problem)
             progress(number / len(paths))
@@ -171,9 +173,29 @@ def detect(
             left_out,
             AssessSettings(),
         )
+        _remove_earlier_masks(out, masks)
         write_json(out / "cracks.json", report)
     say(f"{len(report.cracks)} cracks in {len(seen)} images: {out / 'cracks.json'}")
     warn(left_out)
+
+
+def _remove_earlier_masks(out: Path, masks: set[str]) -> None:
+    """Those that the cracks.json of an earlier run names, and this run has not written."""
+    from artifacts.run_folder import safe_name
+    from schemas.crack_report import CrackReport
+    from schemas.detection import DRAWN
+
+    try:
+        earlier = CrackReport.model_validate_json((out / "cracks.json").read_bytes())
+    except (OSError, ValueError):  # none, or not ours
+        return
+    if earlier.method == DRAWN:  # of `hairline measure`: the masks are the user's
+        return
+    for one in earlier.surfaces:
+        for name in {one.name, PurePath(one.name).stem}:
+            mask = out / safe_name(f"{name}.mask.png")
+            if mask.name not in masks:
+                mask.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)
@@ -185,22 +207,30 @@ class Detected:
 
 
 def detected(
-    path: Path, settings: "DetectSettings", gsd_mm_px: float | None, model: Path | None = None
+    path: Path,
+    settings: "DetectSettings",
+    gsd_mm_px: float | None,
+    model: Path | None = None,
+    before: "Sequence[Photo]" = (),
 ) -> Detected:
-    """One image, seen through to its cracks."""
+    """One image, seen through to its cracks. before: photos whose cracks are counted already."""
     from artifacts import store
     from schemas.settings import PatternSettings
     from tasks.detection.task import detect as detect_cracks
     from tasks.measurement.task import measure as measure_cracks
     from tasks.patterns.task import remove_patterns
-    from tasks.photos.task import ingest, is_mosaic
+    from tasks.photos.task import fit_alone, ingest, is_mosaic
     from tasks.stitching.task import given_mosaic, single
 
     file = store.current().put(path)
     if is_mosaic(file):
         mosaic = given_mosaic(file, path.name, gsd_mm_px)
     else:
-        mosaic = single.bare(ingest.bare(file, path.name, path.stem, None, None, 5.0), gsd_mm_px)
+        photo = ingest.bare(file, path.name, path.stem, None, None, 5.0)
+        *_, fit = fit_alone([*before, photo])
+        if isinstance(fit, BadInput):
+            raise fit
+        mosaic = single.bare(photo, gsd_mm_px)
     patterns = remove_patterns.bare(mosaic, PatternSettings())
     network = store.current().put(model) if model else None
     detection = detect_cracks.bare(mosaic, patterns, settings, network)
@@ -235,8 +265,7 @@ def measure(image: Path, mask: Path, *, out: OutFolder, gsd_mm_px: Gsd = None) -
 
     with working(out):
         for path in (image, mask):
-            if not path.is_file():
-                raise BadInput(str(path), "no such file", "Correct the path")
+            refuse_unless_file(path)
         photo = ingest.bare(store.current().put(image), image.name, image.stem, None, None, 5.0)
         mosaic = single.bare(photo, gsd_mm_px)
         patterns = remove_patterns.bare(mosaic, PatternSettings(remove=False))

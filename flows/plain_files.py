@@ -3,17 +3,18 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Annotated, TypeVar
 
-import yaml
 from cyclopts import Parameter
 from pydantic import BaseModel, ValidationError
 
-from flows.console import StageLines, err
+from flows.console import StageLines, err, plain
 from flows.console import out as console
 from flows.explain import explain
 from flows.inspection_file import read_camera_file
-from flows.output_folder import make_output_folder
+from flows.output_folder import make_output_folder, told_when_full
+from flows.yaml_file import read_yaml
 from schemas.camera import Camera
 from schemas.control import Control
 from schemas.problem import BadInput, LeftOut
@@ -30,7 +31,12 @@ def working(folder: Path) -> Iterator[Callable[[float], None]]:
     from tasks import run
 
     make_output_folder(folder)
-    with store.temporary(), StageLines() as lines, run.running(run.Run(listener=lines)):
+    with (
+        told_when_full(folder, Path(gettempdir())),
+        store.temporary(),
+        StageLines() as lines,
+        run.running(run.Run(listener=lines)),
+    ):
         yield lambda fraction: lines(run.Event("", "progress", fraction=fraction))
 
 
@@ -40,8 +46,15 @@ def warn(left_out: list[LeftOut] | tuple[LeftOut, ...]) -> None:
     for left in left_out:
         items.setdefault((left.what, left.remedy), []).append(left.item)
     for (what, remedy), names in items.items():
-        text = f"Warning: left out: {', '.join(names)}: {what}. {remedy}".rstrip().replace("[", r"\[")
-        err.print(f"[yellow]{text}[/yellow]")
+        text = f"Warning: left out: {', '.join(names)}: {what}. {remedy}".rstrip()
+        err.print(f"[yellow]{plain(text)}[/yellow]")
+
+
+def refuse_unless_file(path: Path, instead_of_a_folder: str = "Name a file in it") -> None:
+    if path.is_dir():
+        raise BadInput(str(path), "is a folder", instead_of_a_folder)
+    if not path.is_file():
+        raise BadInput(str(path), "no such file", "Correct the path")
 
 
 def read_contract(path: Path, contract: type[Model]) -> Model:
@@ -50,8 +63,12 @@ def read_contract(path: Path, contract: type[Model]) -> Model:
         return contract.model_validate_json(path.read_bytes())
     except FileNotFoundError:
         raise BadInput(str(path), "no such file", "Give the JSON that an earlier command wrote") from None
-    except (OSError, UnicodeDecodeError) as problem:
-        raise BadInput(str(path), f"cannot be read ({problem})", "Give a JSON file") from None
+    except IsADirectoryError:
+        raise BadInput(
+            str(path), "is a folder", "Name the JSON file in it that an earlier command wrote"
+        ) from None
+    except OSError as problem:
+        raise BadInput(str(path), f"cannot be read ({problem.strerror})", "Give a JSON file") from None
     except ValidationError as problem:
         raise explain(str(path), problem, contract) from None
 
@@ -64,12 +81,9 @@ def read_camera(path: Path) -> Camera:
 def read_control(path: Path) -> Control:
     """CONTROL.yaml: targets or scale_bars, and the marks or tags that photos show them by."""
     wanted = "targets or scale_bars, and the marks or tags that photos show them by"
+    content = read_yaml(path, "control's YAML file", f"Give a YAML file with {wanted}")
     try:
-        return Control.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except OSError:
-        raise BadInput(str(path), "cannot be read", f"Give a YAML file with {wanted}") from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise BadInput(str(path), "is not valid YAML", f"Write {wanted} in it") from None
+        return Control.model_validate(content)
     except ValidationError as problem:
         raise explain(str(path), problem, Control) from None
 
@@ -91,18 +105,19 @@ def one_by_one(
     return good, [LeftOut.because("reading", problem) for problem in problems]
 
 
-def photos_in(path: Path) -> list[Path]:
-    from flows.given_photos import PHOTO_SUFFIXES, is_photo_file
+def photos_in(path: Path, *, mosaics: bool = False) -> list[Path]:
+    """An image, or the photos in a folder; what else is there is said. mosaics: Hairline's own ones may be
+    what the folder holds."""
+    from flows.photo_files import photo_files
 
     if path.is_file():
         return [path]
     if not path.is_dir():
         raise BadInput(str(path), "no such file or folder", "Correct the path")
-    paths = sorted(p for p in path.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES and is_photo_file(p))
-    if not paths:
-        raise BadInput(str(path), "holds no photo", f"Put {', '.join(sorted(PHOTO_SUFFIXES))} files there")
-    return paths
+    listed = photo_files(path, str(path if path.name else path.resolve()), mosaics=mosaics)
+    warn(listed.not_taken)
+    return listed.paths
 
 
 def say(text: str) -> None:
-    console.print(text.replace("[", r"\["))
+    console.print(plain(text))

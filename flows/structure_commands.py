@@ -8,6 +8,7 @@ from flows.option_types import of_options
 from flows.plain_files import (
     OutFolder,
     one_by_one,
+    refuse_unless_file,
     say,
     warn,
     working,
@@ -69,6 +70,7 @@ def register(
         settings = of_options(RegistrationSettings, voxel_m=voxel_m, tau_m=tau_m, require_all=require_all)
         read: tuple[Scan, ...] = tuple(usable)
         model = register_scans.bare(read, settings, known.targets)
+        model = model.model_copy(update={"left_out": (*left_out, *model.left_out)})
         write_registration(out, model, copy=True)
         write_png(out / "model.png", picture(model))
     taken_in = f"files that state no unit taken in {unit}"
@@ -76,7 +78,7 @@ def register(
     for kind, rmse_m in (("control targets", model.control_rmse_m), ("check points", model.check_rmse_m)):
         if rmse_m is not None:
             say(f"{kind}: {1000 * rmse_m:.1f} mm RMSE")
-    warn([*left_out, *model.left_out])
+    warn(model.left_out)
 
 
 def ingested_scan(path: Path, known: "ScanInput") -> "tuple[Scan, ...]":
@@ -84,8 +86,7 @@ def ingested_scan(path: Path, known: "ScanInput") -> "tuple[Scan, ...]":
     from flows.model_structure import METRES, seen_targets
     from tasks.registration.task import ingest_scan
 
-    if not path.is_file():
-        raise BadInput(str(path), "no such file", "Correct the path")
+    refuse_unless_file(path)
     file, seen = store.current().put(path), seen_targets(known)
     return ingest_scan.bare(file, path.name, METRES[known.unit], known.position_m, known.T_world_scan, seen)
 

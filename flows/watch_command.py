@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from flows.command_line import EXIT_WAITING_FOR_FLIGHT, app
-from flows.console import err
+from flows.console import err, plain
 from flows.console import out as console
 from flows.plain_files import read_camera, read_contract, say
 from schemas.arrival import Arrival
@@ -133,7 +133,7 @@ class Session:
 
 def _photos(folder: Path) -> list[Path]:
     """By the time of writing, then by name: as the camera took them."""
-    from flows.given_photos import PHOTO_SUFFIXES
+    from flows.photo_files import PHOTO_SUFFIXES
 
     try:
         found = [
@@ -151,7 +151,7 @@ def _tell(arrival: Arrival, session: Session) -> None:
     words = [*arrival.faults, *([arrival.note] if arrival.note else [])]
     words += [f"point {arrival.point}"] if arrival.point else []
     words += [f"{len(session.missing)} points to go"] if session.plan else []
-    console.print(f"  {mark} {_escape(arrival.name)}: {_escape(', '.join(words) or 'good')}")
+    console.print(f"  {mark} {plain(arrival.name)}: {plain(', '.join(words) or 'good')}")
 
 
 def _summary(session: Session) -> int:
@@ -160,11 +160,11 @@ def _summary(session: Session) -> int:
     if bad:
         table = Table("photo", "what is wrong", box=None, pad_edge=False)
         for arrival in bad:
-            table.add_row(_escape(arrival.name), _escape("; ".join(arrival.faults)))
+            table.add_row(plain(arrival.name), plain("; ".join(arrival.faults)))
         console.print(table)
     waiting = [path.name for path in _photos(session.folder) if path.name not in session.judged]
     if waiting:
-        err.print(f"[yellow]Not judged yet: {_escape(', '.join(waiting))}[/yellow]")
+        err.print(f"[yellow]Not judged yet: {plain(', '.join(waiting))}[/yellow]")
     if session.plan is None:
         return 0
     if not session.missing:
@@ -179,7 +179,3 @@ def _summary(session: Session) -> int:
     err.print(f"[yellow]{len(session.missing)} shooting points have no good photo:[/yellow]")
     console.print(table)
     return EXIT_WAITING_FOR_FLIGHT
-
-
-def _escape(text: str) -> str:
-    return text.replace("[", r"\[")

@@ -36,7 +36,9 @@ class Photo(Contract):
         """Why nothing can be seen in it, where that is so."""
         if self.white > LOST:
             return f"overexposed ({self.white:.0%} of it is white)"
-        return f"underexposed ({self.black:.0%} of it is black)" if self.black > LOST else None
+        if self.black > LOST:
+            return f"underexposed ({self.black:.0%} of it is black)"
+        return "blank (all of it is one grey)" if self.sharpness == 0 else None
 
 
 def sharpness_shares(photos: Sequence[Photo]) -> list[float]:

@@ -2,6 +2,7 @@
 
 from schemas.contract import Contract, Matrix4, Vector3
 from schemas.file import File
+from schemas.problem import LeftOut
 from schemas.target import SeenTarget
 from schemas.utm import UtmZone
 
@@ -18,3 +19,4 @@ class Scan(Contract):
     T_world_scan: Matrix4 | None = None  # full prior pose, where the file or the crew has one
     utm_zone: UtmZone | None = None  # of the file's coordinates, where the file states one
     targets: tuple[SeenTarget, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()  # what of its file could not be read

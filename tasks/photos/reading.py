@@ -5,10 +5,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
+import cv2
+import imagecodecs
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, ImageOps, UnidentifiedImageError
+import tifffile
+from PIL import Image, ImageFile, ImageOps, UnidentifiedImageError
 
 from schemas.problem import BadInput
 
@@ -41,14 +45,20 @@ def read_photo(path: Path, name: str) -> Decoded:
     """Raises BadInput: not an image, truncated, too small, too large, or of no photographic kind."""
     with _opened(path, name) as image:
         _check_size(image, name)
+        has_deep_colour = _has_deep_colour(image)
         exif = image.getexif()
         xmp = image.info.get("xmp", b"")
-        image.load()
         orientation = _orientation(exif)
-        pixels = _rgb(_upright(image, orientation), name)
+        image.load()  # Pillow turns a TIFF upright itself
+        if has_deep_colour:
+            stored = Image.fromarray(_deep_colour(path, image.format))
+            stored.getexif()[0x0112] = orientation
+        else:
+            stored = image
+        pixels = _rgb(_upright(stored, orientation), name)
         # MPO: a JPEG with a second picture inside, as DJI writes
         known = image.format in ("JPEG", "MPO", "PNG") and image.mode in ("RGB", "L")
-        plain = known and orientation == 1
+        plain = known and orientation == 1 and not has_deep_colour
     return Decoded(pixels, orientation, plain, exif, xmp if isinstance(xmp, bytes) else xmp.encode())
 
 
@@ -112,17 +122,46 @@ def _orientation(exif: Image.Exif) -> int:
     return value if value in range(1, 9) else 1
 
 
+def _has_deep_colour(image: Image.Image) -> bool:
+    """Of an image that is not yet loaded: 16-bit channels, of which Pillow keeps the upper bytes."""
+    in_tiff = 16 in getattr(image, "tag_v2", {}).get(258, ())  # BitsPerSample
+    packed = image.tile if isinstance(image, ImageFile.ImageFile) else []
+    return image.mode in ("RGB", "RGBA") and (in_tiff or any(";16" in str(tile[3]) for tile in packed))
+
+
+def _deep_colour(path: Path, kind: str | None) -> Pixels:
+    """(H, W, 3) as stored, brought to 8 bits. kind: as Pillow names it."""
+    try:
+        if kind == "PNG":
+            values = imagecodecs.png_decode(path.read_bytes())
+        else:
+            with tifffile.TiffFile(path) as file:
+                page = cast(tifffile.TiffPage, file.pages[0])
+                apart = page.planarconfig == tifffile.PLANARCONFIG.SEPARATE
+                values = np.moveaxis(page.asarray(), 0, -1) if apart else page.asarray()
+    except Exception as error:  # whatever a codec raises over damaged bytes
+        raise ValueError(error) from error
+    colour = np.ascontiguousarray(values[..., :3])  # no alpha: a photo shows what it covers
+    return np.asarray(cv2.convertScaleAbs(colour, alpha=255.0 / _white(int(colour.max()))), np.uint8)
+
+
+def _white(brightest: int) -> float:
+    """Cameras of 10, 12 and 14 bits write these into 16, and no file says so: the fewest that hold it."""
+    return float(next(2**bits - 1 for bits in (8, 10, 12, 14, 16) if brightest < 2**bits))
+
+
 def _upright(image: Image.Image, orientation: int) -> Image.Image:
     return image if orientation == 1 else ImageOps.exif_transpose(image)
 
 
 def _rgb(image: Image.Image, name: str) -> Pixels:
-    """16-bit is scaled by 257, CMYK and palette converted, alpha dropped (a photo shows what it covers)."""
+    """Deep grey is scaled to 8 bits, CMYK and palette converted, alpha dropped (a photo shows what it
+    covers)."""
     if image.mode.startswith("I") or image.mode == "F":
         values = np.asarray(image, dtype=np.float64)
         if not np.isfinite(values).all() or values.min() < 0 or values.max() > 65535:
             raise BadInput(name, "has floating-point or 32-bit values that are no photo", REMEDY)
-        white = 1.0 if image.mode == "F" and values.max() <= 1 else 255.0 if values.max() <= 255 else 65535.0
+        white = 1.0 if image.mode == "F" and values.max() <= 1 else _white(int(values.max()))
         grey = np.rint(values * (255.0 / white)).astype(np.uint8)
         return np.repeat(grey[..., None], 3, axis=2)
     return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))  # convert would copy

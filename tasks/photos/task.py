@@ -146,6 +146,13 @@ def calibrate(
     return made, draw_calibration(made)
 
 
+def fit_alone(photos: Sequence[Photo]) -> tuple[Photo | BadInput, ...]:
+    """Of photos that stand for themselves, each or why it is not inspected; no stage: it takes no time."""
+    from tasks.photos.alone import fit_alone as fit
+
+    return fit(photos)
+
+
 def judge(photos: Sequence[Photo], plan: FlightPlan | None) -> tuple[tuple[Arrival, ...], tuple[str, ...]]:
     """What each photo so far is good for, and the plan's shooting points that have no good photo yet; no
     stage: it is asked while photos arrive."""

@@ -22,7 +22,7 @@ SMALLEST_M, LARGEST_M = 0.2, 10_000.0  # extent of what a terrestrial scanner se
 FARTHEST_M = 1e8  # no coordinate system on Earth goes so far
 LARGE_COORDINATE_M = 1000.0  # beyond it float32 is coarser than 0.06 mm: shift to a local origin
 UNITS_M = {"km": 1000.0, "m": 1.0, "ft": 0.3048, "in": 0.0254, "cm": 0.01, "mm": 0.001}
-TYPICAL_EXTENT_M = 60.0
+USUAL_M = (1.0, 2000.0)  # extent of what is inspected, for naming the units that a scan may be in
 
 
 SAMPLED = 10_000  # points of a block by which the extent is judged
@@ -63,6 +63,11 @@ def stated_utm_zone(path: Path, name: str | None = None) -> str | None:
         if path.suffix.lower() in (".las", ".laz"):
             return las.stated_utm_zone(path)
         return e57.stated_utm_zone(path) if path.suffix.lower() == ".e57" else None
+
+
+def cut_short(path: Path) -> bool:
+    """Whether its last row is a torso, which `scan_blocks` passes over: some of the file is lost."""
+    return _reader(path, path.name) is xyz and xyz.is_cut_short(path)
 
 
 def scan_blocks(
@@ -157,10 +162,12 @@ class _BadInputOf:
 
     def __exit__(self, kind: object, error: BaseException | None, _: object) -> None:
         if isinstance(error, Exception) and not isinstance(error, BadInput):
-            what = str(error) if isinstance(error, Unreadable) else f"its bytes make no sense ({error})"
+            told = (
+                error if isinstance(error, Unreadable) else Unreadable(f"its bytes make no sense ({error})")
+            )
             if isinstance(error, UnicodeDecodeError):
-                what = "it is no text file, though its name says so"
-            raise BadInput(self.name, what, "Export the scan again, or leave the file out.") from error
+                told = Unreadable("it is no text file, though its name says so")
+            raise BadInput(self.name, str(told), told.remedy) from error
 
 
 def _check_extent(points_m: Array, unit_m: float, name: str) -> None:
@@ -170,15 +177,22 @@ def _check_extent(points_m: Array, unit_m: float, name: str) -> None:
     extent_m = float(np.linalg.norm(high_m - low_m))
     if extent_m == 0.0 or SMALLEST_M <= extent_m <= LARGEST_M:
         return
-    in_file = extent_m / unit_m
-    likely = min(UNITS_M, key=lambda unit: abs(np.log(in_file * UNITS_M[unit] / TYPICAL_EXTENT_M)))
-    remedy = "convert it to metres" if likely == "km" else f"state unit: {likely}, or --unit {likely}"
-    size = f"{extent_m / 1000:.3g} km" if extent_m > LARGEST_M else f"{extent_m * 1000:.3g} mm"
+    sizes_m = {unit: metres * extent_m / unit_m for unit, metres in UNITS_M.items()}
+    low_m, high_m = USUAL_M
+    usual = [f"{unit}: {_in_words(size_m)}" for unit, size_m in sizes_m.items() if low_m <= size_m <= high_m]
+    state = f"State its unit, --unit or unit:, by the size that it has ({', '.join(usual)})"
+    by_hand = "; from km, convert it to metres first" if low_m <= sizes_m["km"] <= high_m else ""
     raise BadInput(
         name,
-        f"taken in units of {unit_m:g} m it is {size} large, which no scanned structure is",
-        f"Its unit is likely {likely}: {remedy}.",
+        f"taken in units of {unit_m:g} m it is {_in_words(extent_m)} large, which no scanned structure is",
+        f"{state}{by_hand}." if usual else "Check its unit and its coordinates.",
     )
+
+
+def _in_words(size_m: float) -> str:
+    if size_m < 1.0:
+        return f"{size_m * 1000:.3g} mm"
+    return f"{size_m:.3g} m" if size_m < 1000.0 else f"{size_m / 1000:.3g} km"
 
 
 def _unit_normals(normals: Array | None, finite: npt.NDArray[np.bool_]) -> Array | None:

@@ -29,6 +29,7 @@ from tasks.registration.pose_graph import (
 from tasks.registration.read_scan import LARGE_COORDINATE_M
 from tasks.registration.rigid_motion import Array, pose, transform
 from tasks.registration.site_datum import Sighting, residuals, tie_to_datum, unused
+from tasks.registration.stated_unit import other_unit
 from tasks.registration.station_site import Site, shape
 from tasks.registration.ties import Tie, aligned, candidate_pairs, ties
 
@@ -66,7 +67,7 @@ def register(
         shelf = Shelf(folder)
         sites, left_out = load_stations(scans, settings, shelf, lambda f: on_progress(0.4 * f))
         tied, T_first, kept, rival_m = _tie_together(sites, settings, lambda f: on_progress(0.4 + 0.5 * f))
-        loose = [_untied(site, rival_m.get(i)) for i, site in enumerate(sites) if i not in tied]
+        loose = [_untied(site, rival_m.get(i), sites) for i, site in enumerate(sites) if i not in tied]
         _refuse(sites, loose, settings.require_all)
         sites = [sites[i] for i in tied]
         T_world, origin_m, T_world_first, found, unused_targets = _in_world(sites, T_first, targets)
@@ -132,7 +133,8 @@ def _refuse(sites: Sequence[Site], loose: Sequence[LeftOut], require_all: bool) 
         raise BadInput(
             ", ".join(s.name for s in sites),
             "no two of these scans overlap enough to be tied to each other",
-            "Scan with more overlap between neighbouring stations, or state the stations' positions.",
+            "Scan with more overlap between neighbouring stations, or state the stations' positions."
+            + next(filter(None, (_other_unit(s, sites) for s in sites)), ""),
         )
     if loose and require_all:
         raise BadInput(
@@ -208,13 +210,17 @@ def _stations(
     return tuple(found)
 
 
-def _untied(site: Site, rival_m: float | None) -> LeftOut:
+def _untied(site: Site, rival_m: float | None, sites: Sequence[Site]) -> LeftOut:
     """Why the scan stands alone. rival_m: between places where it fits, if there are several."""
     if rival_m is None:
-        remedy = "Scan again with more overlap, or state the station's position."
+        remedy = "Scan again with more overlap, or state the station's position." + _other_unit(site, sites)
         return LeftOut(item=site.name, stage=STAGE, what=NO_OVERLAP, remedy=remedy)
     what = f"it fits in more than one place about equally well, {rival_m:.1f} m apart"
     return LeftOut(item=site.name, stage=STAGE, what=what, remedy=STATE_POSITION)
+
+
+def _other_unit(site: Site, sites: Sequence[Site]) -> str:
+    return other_unit(site.name, {one.name: one.sample_m for one in sites})
 
 
 def _scan_pair(tied: Tie, sites: Sequence[Site]) -> ScanPair:

@@ -9,7 +9,7 @@ from artifacts.page import Page
 from artifacts.picture import markdown_of
 from schemas.contract import Matrix4, Vector3
 from schemas.file import File
-from schemas.problem import BadInput
+from schemas.problem import BadInput, LeftOut
 from schemas.raster import Pixels
 from schemas.registered_model import RegisteredModel
 from schemas.scan import Scan
@@ -18,6 +18,11 @@ from schemas.target import SeenTarget, SiteTarget, TargetResidual
 from tasks.stage import progress, stage
 
 AXES = ("east", "north", "up")
+CUT_SHORT = {
+    "stage": "registration",
+    "what": "the file breaks off in its last row; the rows before are used",
+    "remedy": "Copy or export it again",
+}
 
 
 @stage()
@@ -35,7 +40,13 @@ def ingest_scan(
     unit_m: metres per unit of the file's coordinates; where it is 1 and the file itself states another
     (LAS, LAZ), the file's holds. BadInput where no scan of the file can be used.
     """
-    from tasks.registration.read_scan import scan_blocks, scan_count, stated_unit_m, stated_utm_zone
+    from tasks.registration.read_scan import (
+        cut_short,
+        scan_blocks,
+        scan_count,
+        stated_unit_m,
+        stated_utm_zone,
+    )
 
     path = store.current().path(file)
     count = scan_count(path, name)
@@ -48,6 +59,7 @@ def ingest_scan(
     if unit_m == 1.0:
         unit_m = stated_unit_m(path, name) or unit_m
     utm_zone = stated_utm_zone(path, name)
+    left_out = (LeftOut(item=f"the end of {name}", **CUT_SHORT),) if cut_short(path) else ()
     scans = tuple(
         Scan(
             name=name if count == 1 else f"{name}-{index + 1}",
@@ -58,6 +70,7 @@ def ingest_scan(
             T_world_scan=T_world_scan,
             utm_zone=utm_zone,
             targets=targets,
+            left_out=left_out,
         )
         for index in range(count)
     )
@@ -159,5 +172,5 @@ def register(
         points=found.model.points,
         min_m=(float(low_m[0]), float(low_m[1]), float(low_m[2])),
         max_m=(float(high_m[0]), float(high_m[1]), float(high_m[2])),
-        left_out=found.left_out,
+        left_out=(*(left for scan in scans for left in scan.left_out), *found.left_out),
     )

@@ -1,3 +1,4 @@
+import re
 from contextlib import closing
 from pathlib import Path
 
@@ -62,6 +63,9 @@ def test_what_is_no_tiff_is_named(tmp_path: Path) -> None:
 
 def test_keys_hold_only_what_the_dashboard_takes() -> None:
     assert page_key("cracks", "Web_left (2).JPG") == "cracks-web-left-2-jpg"
+    keys = [page_key("cracks", name) for name in ("桥梁", "隧道", "Été", "Ète", "t")]
+    assert len(set(keys)) == len(keys)
+    assert all(re.fullmatch("[a-z0-9-]+", key) for key in keys)
 
 
 def lines(*levels: int) -> np.ndarray:
@@ -88,3 +92,15 @@ def test_a_mask_that_is_black_on_white_is_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "m.png"), np.uint8(255 * (np.arange(100) > 5)) * np.ones((100, 1), np.uint8))
     with pytest.raises(BadInput, match=r"m.png: marks 94 % .*invert"):
         read_drawn_mask(tmp_path / "m.png", "m.png")
+
+
+def test_a_mask_drawn_in_the_transparency_is_read(tmp_path: Path) -> None:
+    drawn = np.zeros((20, 30), np.uint8)
+    drawn[8:11] = 255
+    for colour in (0, 255):
+        of_one_colour = np.dstack([np.full((20, 30, 3), colour, np.uint8), drawn])
+        cv2.imwrite(str(tmp_path / "m.png"), of_one_colour)
+        assert (read_drawn_mask(tmp_path / "m.png", "m.png") == (drawn > 0)).all()
+    opaque = np.dstack([drawn] * 3 + [np.full_like(drawn, 255)])
+    cv2.imwrite(str(tmp_path / "m.png"), opaque)
+    assert (read_drawn_mask(tmp_path / "m.png", "m.png") == (drawn > 0)).all()

@@ -53,3 +53,14 @@ def test_figures_curves_and_the_worst_images(tmp_path: Path, capsys: pytest.Capt
     for third, colour in ((1, MISSED), (2, RIGHT)):  # what was drawn; what was found
         part = side_by_side[:, third * side_by_side.shape[1] // 3 :]
         assert (np.abs(part - palette.rgb(colour).astype(int)).max(axis=2) < 40).sum() > 100
+
+
+def test_masks_without_any_crack_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for part in ("images", "masks"):
+        (tmp_path / part).mkdir()
+    write_cracked(tmp_path, "a.png", 0)
+    evaluate(tmp_path / "images", tmp_path / "masks", out=tmp_path / "out", method=("ridge",))
+    assert "marks any crack" not in capsys.readouterr().err
+    cv2.imwrite(str(tmp_path / "masks" / "a.png"), np.zeros((256, 256), np.uint8))
+    evaluate(tmp_path / "images", tmp_path / "masks", out=tmp_path / "out", method=("ridge",))
+    assert "marks any crack" in capsys.readouterr().err

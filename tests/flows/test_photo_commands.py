@@ -1,14 +1,17 @@
 """What the commands on photos say beside their results."""
 
 import hashlib
+import json
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 import tifffile
 
 from artifacts import store
 from artifacts.mask_png import read_mask
-from flows.photo_commands import _warn_of_assumed, detected
+from flows.photo_commands import _warn_of_assumed, detect, detected, stitch
 from schemas.camera import Camera
 from schemas.file import File
 from schemas.photo import Photo
@@ -57,3 +60,40 @@ def test_a_mosaic_too_large_for_a_photo_is_seen_through_the_same(
             assert len(found.mosaic.photos) == (most_px > 1000) and len(found.measurement.cracks) == 1
             masks.append(read_mask(files.path(found.detection.mask), "wall").whole())
     assert masks[0].any() and (masks[0] == masks[1]).all()
+
+
+def test_blank_and_equal_photos_are_not_inspected_and_earlier_masks_go(tmp_path: Path) -> None:
+    images, out = tmp_path / "images", tmp_path / "out"
+    images.mkdir()
+    wall = drawn_crack(lambda x: 0 * x + 4.0, darkness=0.7).rgb
+    for name in ("a.png", "b.png"):
+        cv2.imwrite(str(images / name), wall)
+    cv2.imwrite(str(images / "black.png"), np.zeros_like(wall))
+    detect(images, out=out, method="ridge")
+    told = json.loads((out / "cracks.json").read_text())
+    assert [(one["name"], one["cracks"]) for one in told["surfaces"]] == [("a.png", 1)]
+    assert {one["item"]: one["what"] for one in told["not_inspected"]} == {
+        "b.png": "the same picture as a.png",
+        "black.png": "underexposed (100% of it is black)",
+    }
+    for name in ("a.png", "b.png"):
+        (images / name).unlink()
+    cv2.imwrite(str(images / "c.png"), wall)
+    (out / "mine.mask.png").write_bytes(b"the user's")
+    detect(images / "c.png", out=out, method="ridge")
+    assert sorted(path.name for path in out.iterdir()) == ["c.mask.png", "cracks.json", "mine.mask.png"]
+
+
+def test_photos_that_cannot_be_read_stand_in_the_results_of_stitching(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (300, 500, 3)).astype(np.uint8)
+    wall = cv2.GaussianBlur(noise, (0, 0), 2.0)
+    wall = cv2.normalize(wall, None, 0, 255, cv2.NORM_MINMAX)
+    for k in range(3):
+        cv2.imwrite(str(tmp_path / f"{k}.png"), wall[:, 60 * k : 60 * k + 360])
+    (tmp_path / "damaged.jpg").write_text("<html>")
+    out = tmp_path / "out"
+    stitch(tmp_path, out=out)
+    told = json.loads((out / "stitch.json").read_text())
+    assert ("damaged.jpg", "is not an image that can be read") in [
+        (one["item"], one["what"]) for one in told["left_out"]
+    ]

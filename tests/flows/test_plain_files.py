@@ -1,5 +1,7 @@
 """What the commands of single stages share: files that are none, folders that cannot be written to."""
 
+import errno
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -7,13 +9,33 @@ import pytest
 from flows.collect_images import collect
 from flows.flight_commands import convert_log
 from flows.opening import opened
-from flows.plain_files import photos_in, working
+from flows.output_folder import told_when_full
+from flows.plain_files import photos_in, read_camera, read_contract, read_control, refuse_unless_file, working
 from flows.structure_commands import register
+from schemas.file import File
+from schemas.flight_plan import FlightPlan
 from schemas.inspection import Inspection, PhotoSet
 from schemas.problem import BadInput
 from tasks.flight.recording import Fix, Recording, Trigger
 from tests.flows.test_watch import picture
 from tests.small_inspection import write_inspection
+
+
+@pytest.mark.parametrize(
+    "read", [refuse_unless_file, read_camera, read_control, lambda path: read_contract(path, FlightPlan)]
+)
+def test_a_folder_in_place_of_a_file_is_called_one(tmp_path: Path, read: Callable[[Path], object]) -> None:
+    with pytest.raises(BadInput, match="is a folder"):
+        read(tmp_path)
+
+
+def test_a_disk_that_gets_full_is_told_by_its_folder(tmp_path: Path) -> None:
+    told = r"out: cannot be written to \(No space left on device\). Free space there, or give another --out"
+    with pytest.raises(BadInput, match=told), told_when_full(tmp_path / "none", tmp_path / "out"):
+        (tmp_path / "out").mkdir()
+        raise OSError(errno.ENOSPC, "No space left on device")
+    with pytest.raises(PermissionError), told_when_full(tmp_path):
+        raise PermissionError(errno.EACCES, "Permission denied")
 
 
 def test_a_folder_named_like_a_photo_is_none(tmp_path: Path) -> None:
@@ -84,3 +106,14 @@ def test_a_converted_log_is_told_by_what_it_holds(
 def test_no_scan_is_told(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no scan is given"):
         register(out=tmp_path / "out")
+
+
+def test_json_of_another_form_is_told_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "file.json"
+    for text, told in (
+        ("{", r"file\.json: is not valid JSON \("),
+        ('{"sha256": "x", "size": 1, "suffix": ""}', "key 'sha256' cannot be 'x'"),
+    ):
+        path.write_text(text)
+        with pytest.raises(BadInput, match=told):
+            read_contract(path, File)

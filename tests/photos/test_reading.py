@@ -125,6 +125,42 @@ def test_sixteen_bit_colour_keeps_its_brightness(tmp_path: Path) -> None:
         assert np.abs(decoded.pixels.astype(int) - rgb).max() <= 1, name
 
 
+@pytest.mark.parametrize("bits", [10, 12, 14, 16])
+def test_deep_photos_are_scaled_by_the_bits_that_are_used(tmp_path: Path, bits: int) -> None:
+    white = 2**bits - 1
+    rgb = gradient().astype(np.uint16)
+    deep = (rgb * (white / 255)).round().astype(np.uint16)
+    deep[0, 0] = white
+    alpha = np.full(rgb.shape[:2], 65535, np.uint16)
+    tifffile.imwrite(tmp_path / "rgb.tif", deep, photometric="rgb")
+    apart = np.moveaxis(deep, -1, 0)
+    tifffile.imwrite(tmp_path / "apart.tif", apart, photometric="rgb", planarconfig="separate")
+    cv2.imwrite(str(tmp_path / "rgb.png"), deep[..., ::-1])
+    cv2.imwrite(str(tmp_path / "rgba.png"), np.dstack([deep[..., ::-1], alpha]))
+    cv2.imwrite(str(tmp_path / "grey.png"), deep[..., 0])
+    cv2.imwrite(str(tmp_path / "grey.tif"), deep[..., 0])
+    for path in sorted(tmp_path.iterdir()):
+        decoded = read_photo(path, path.name)
+        expected = rgb if path.stem != "grey" else np.repeat(rgb[..., :1], 3, axis=2)
+        assert np.abs(decoded.pixels.astype(int) - expected)[1:].max() <= 1, path.name
+        assert not decoded.as_it_came, path.name
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_a_tiff_is_turned_once(tmp_path: Path, orientation: int, kind: type[np.generic]) -> None:
+    rgb = gradient()
+    stored = rgb.astype(kind) * (1 if kind is np.uint8 else 257)
+    tag = (274, "H", 1, orientation, True)
+    tifffile.imwrite(tmp_path / "turned.tif", stored, photometric="rgb", extratags=[tag])
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(rgb).save(tmp_path / "turned.png", exif=exif)
+    of_tiff, of_png = (read_photo(tmp_path / f"turned.{suffix}", "t") for suffix in ("tif", "png"))
+    np.testing.assert_array_equal(of_tiff.pixels, of_png.pixels)
+    assert of_tiff.orientation == of_png.orientation == orientation
+
+
 @pytest.mark.parametrize(
     "name", ["a photo with spaces.jpg", "Brücke–№1 橋.jpg", "-rf.jpg", "100%{x}[red].jpg", "a'b\"c.jpg"]
 )

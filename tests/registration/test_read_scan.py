@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.problem import BadInput
-from tasks.registration.read_scan import READERS, read_scan, scan_blocks, scan_count, stated_unit_m
+from tasks.registration.read_scan import READERS, cut_short, read_scan, scan_blocks, scan_count, stated_unit_m
 from tasks.registration.readers import e57, las, ply, text_rows
 from tasks.registration.readers import pcd as pcd_reader
 from tasks.registration.readers.file_scan import Unreadable
@@ -97,15 +97,52 @@ def test_broken_files_say_what_is_wrong(tmp_path: Path, name: str, content: str 
     assert caught.value.remedy
 
 
-def test_extent_names_the_likely_unit(tmp_path: Path) -> None:
-    bridge = POINTS * [10, 10, 2]  # about 70 m
+def test_extent_names_every_unit_that_may_be_meant(tmp_path: Path) -> None:
+    bridge = POINTS * [10, 10, 2]  # about 80 m
     millimetres = written(tmp_path, "mm.xyz", rows(bridge * 1000))
     kilometres = written(tmp_path, "km.xyz", rows(bridge / 1000))
-    with pytest.raises(BadInput, match=r"likely mm: state unit: mm, or --unit mm"):
+    with pytest.raises(BadInput, match=r"by .*\(in: 1.96 km, cm: 773 m, mm: 77.3 m\)\.") as caught:
         read_scan(millimetres)
-    with pytest.raises(BadInput, match="likely km: convert it to metres"):
+    assert "likely" not in str(caught.value)
+    with pytest.raises(BadInput, match=r"km: 77.3 m\); from km, convert it to metres first"):
         read_scan(kilometres)
+    with pytest.raises(BadInput, match="Check its unit and its coordinates"):
+        read_scan(written(tmp_path, "far.xyz", rows(bridge * 1e6)))
     assert np.allclose(read_scan(millimetres, unit_m=0.001).points_m, bridge)
+
+
+def test_a_column_that_counts_the_rows_is_no_coordinate(tmp_path: Path) -> None:
+    points = np.vstack([POINTS] * 4) + np.arange(16)[:, None] / 8
+    numbered = rows(np.column_stack([np.arange(1, 17), points]), ",")
+    with pytest.raises(BadInput, match="counts the rows") as caught:
+        read_scan(written(tmp_path, "numbered.csv", numbered))
+    assert "id,x,y,z" in caught.value.remedy
+    for header in ("id,x,y,z\n", "# id,x,y,z\n"):
+        assert np.allclose(read_scan(written(tmp_path, "named.csv", header + numbered)).points_m, points)
+    line = np.column_stack([np.arange(16), np.zeros((16, 2))])  # three columns: a row of a grid
+    assert len(read_scan(written(tmp_path, "grid.xyz", rows(line))).points_m) == 16
+
+
+def test_the_rows_before_a_cut_one_are_read(tmp_path: Path) -> None:
+    for name, text in (("a.xyz", rows(POINTS)), ("a.csv", "x;y;z\n" + rows(POINTS, ";").replace(".", ","))):
+        whole = written(tmp_path, name, text.rstrip("\n"))
+        assert not cut_short(whole) and len(read_scan(whole).points_m) == 4
+        cut = written(tmp_path, name, text[:-5])
+        assert cut_short(cut) and np.allclose(read_scan(cut).points_m, POINTS[:3]), name
+    with pytest.raises(BadInput, match="4 points are announced and 3 follow"):
+        read_scan(written(tmp_path, "n.xyz", "4\n" + rows(POINTS)[:-5]))
+
+
+def test_lists_of_an_ascii_ply_are_passed_over(tmp_path: Path) -> None:
+    header = ply_header("ascii").replace(
+        "property double y\n", "property list uchar int a\nproperty double y\n"
+    )
+    lines = "".join(f"{x} {k} {'7 ' * k}{y} {z}\n" for k, (x, y, z) in enumerate(POINTS))
+    assert np.array_equal(read_scan(written(tmp_path, "l.ply", header + lines)).points_m, POINTS)
+    with pytest.raises(BadInput, match=r"lists of its points do not fit the row '1 9 1 1'"):
+        read_scan(written(tmp_path, "l.ply", header + "1 9 1 1\n"))
+    with pytest.raises(BadInput, match="in ASCII files only"):
+        read_scan(written(tmp_path, "l.ply", header.replace("ascii", "binary_little_endian") + lines))
 
 
 def test_xyz_and_csv_dialects(tmp_path: Path) -> None:

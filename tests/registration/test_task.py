@@ -128,3 +128,14 @@ def _las(path: Path, points_m: Array, system: str) -> Path:
     las.x, las.y, las.z = points_m.T
     las.write(path)
     return path
+
+
+def test_a_file_that_breaks_off_is_used_and_named(site_folder: Path, tmp_path: Path) -> None:
+    points = read_scan(site_folder / "station0.ply").points_m[::8]
+    text = "".join(f"{x:.4f} {y:.4f} {z:.4f}\n" for x, y, z in points)
+    path = tmp_path / "cut.xyz"
+    path.write_text(text[:-12])
+    scans = ingest_scan.bare(store.current().put(path), "cut.xyz", 1.0, None, None)
+    model = register.bare(scans, RegistrationSettings())
+    assert [station.name for station in model.stations] == ["cut.xyz"]
+    assert [(one.item, one.stage) for one in model.left_out] == [("the end of cut.xyz", "registration")]

@@ -18,6 +18,10 @@ BLOCK = 1 << 20  # points
 class Unreadable(Exception):
     """A file that is not what its name says, is cut short, or holds what no scan can be."""
 
+    def __init__(self, what: str, remedy: str = "Export the scan again, or leave the file out.") -> None:
+        super().__init__(what)
+        self.remedy = remedy
+
 
 @dataclass(frozen=True)
 class FileScan:

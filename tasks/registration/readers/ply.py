@@ -42,16 +42,19 @@ def read(path: Path, index: int) -> Iterator[FileScan]:
         if at is None:
             raise Unreadable("it is a PLY file without points (no element vertex)")
         vertex = elements[at]
-        names = [name for name, _ in vertex.properties]
+        names = [name for name, kind in vertex.properties if kind != "list"]
         if not {"x", "y", "z"} <= set(names):
             raise Unreadable("its points have no properties x, y, z")
         wanted = ["x", "y", "z", *(["nx", "ny", "nz"] if {"nx", "ny", "nz"} <= set(names) else [])]
-        if any(kind == "list" for element in elements[: at + 1] for _, kind in element.properties):
-            raise Unreadable("its points are mixed with lists, which a scan has no use for")
+        lists = any(kind == "list" for element in elements[: at + 1] for _, kind in element.properties)
+        if lists and encoding != "ascii":
+            raise Unreadable("its points are mixed with lists, which are passed over in ASCII files only")
         if encoding == "ascii":
             text = (line.decode("ascii") for line in stream)
             for _ in itertools.islice(text, sum(element.count for element in elements[:at])):
                 pass
+            if lists:
+                text = (_without_lists(line.split(), vertex) for line in text)
             for rows in row_blocks(text, [names.index(name) for name in wanted], vertex.count):
                 yield _block(rows)
         else:
@@ -67,6 +70,21 @@ def read(path: Path, index: int) -> Iterator[FileScan]:
             for done in range(0, vertex.count, BLOCK):
                 table = np.fromfile(stream, dtype, min(BLOCK, vertex.count - done))
                 yield _block(np.column_stack([table[name].astype(np.float64) for name in wanted]))
+
+
+def _without_lists(words: list[str], element: Element) -> str:
+    """A row's scalars; each list is its length, then so many numbers."""
+    kept, at = [], 0
+    try:
+        for _, kind in element.properties:
+            if kind == "list":
+                at += 1 + int(words[at])
+            else:
+                kept.append(words[at])
+                at += 1
+    except (IndexError, ValueError):
+        raise Unreadable(f"the lists of its points do not fit the row {' '.join(words)[:40]!r}") from None
+    return " ".join(kept)
 
 
 def _block(rows: Array) -> FileScan:
