@@ -1,13 +1,13 @@
 """The folder of a run as people read it: the store's objects under names that say what they are."""
 
 import hashlib
-import os
 import re
 import shutil
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from artifacts import store
+from artifacts.whole_file import whole
 from schemas.file import File, Folder
 
 LONGEST = 100  # bytes of a name; file systems stop at 255
@@ -66,15 +66,11 @@ def _place(file: File, target: Path, copy: bool) -> None:
     if _is_placed(file, source, target, copy):
         return
     target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.{os.urandom(4).hex()}")
-    try:
+    with whole(target) as temporary:
         if copy:
             shutil.copyfile(source, temporary)
         else:
             _link(source, temporary)
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _is_placed(file: File, source: Path, target: Path, copy: bool) -> bool:

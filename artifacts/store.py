@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from artifacts.whole_file import whole
 from schemas.file import File, Folder, FolderEntry
 from schemas.problem import BadInput
 
@@ -39,9 +40,8 @@ class Store:
         target = self._object(file.sha256, file.suffix)
         if not self.holds(file):
             target.parent.mkdir(parents=True, exist_ok=True)
-            temporary = target.with_name(f".{target.name}.{os.getpid()}.{os.urandom(4).hex()}")
-            _link_or_copy(path, temporary)
-            temporary.replace(target)
+            with whole(target) as temporary:
+                _link_or_copy(path, temporary)
         return file
 
     def put_folder(self, folder: Path) -> Folder:

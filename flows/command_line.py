@@ -4,13 +4,14 @@ import os
 import shlex
 import sys
 import traceback
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
 
-from flows.console import err, out
+from flows.console import err, out, plain
 from schemas.problem import BadInput
 
 app = cyclopts.App(
@@ -22,6 +23,8 @@ app = cyclopts.App(
     suppress_keyboard_interrupt=False,  # main() says what is kept
 )
 Out = Annotated[Path | None, Parameter(name="--out")]
+
+KEPT = "finished stages are kept"
 
 EXIT_UNUSABLE_INPUT = 2
 EXIT_WAITING_FOR_FLIGHT = 3
@@ -94,7 +97,7 @@ def init(folder: Path, *, name: str | None = None) -> int:
     from flows.init_inspection import init_inspection
 
     path = init_inspection(folder, name)
-    out.print(f"Wrote {path}. Check it, then: hairline run {shlex.quote(str(path))}", markup=False)
+    out.print(plain(f"Wrote {path}. Check it, then: hairline run {shlex.quote(str(path))}"))
     return 0
 
 
@@ -145,7 +148,8 @@ def main() -> None:
     except cyclopts.CycloptsError:  # cyclopts has said what is wrong with the words of the command
         code = EXIT_UNUSABLE_INPUT
     except KeyboardInterrupt:
-        _say("Interrupted", "finished stages are kept; the same command goes on from there.")
+        goes_on = f"{KEPT}; the same command goes on from there."
+        _say("Interrupted", goes_on if _keeps_stages() else "the command was stopped.")
         code = 130
     except Exception as problem:
         _say("Unexpected error", _for_a_bug_report(problem))
@@ -154,8 +158,13 @@ def main() -> None:
     sys.exit(code)
 
 
+def _keeps_stages() -> bool:
+    """Whether the command is one that goes on where it stopped; the others start anew."""
+    return sys.argv[1:2] in (["run"], ["demo"])
+
+
 def _say(kind: str, text: str) -> None:
-    err.print(f"[bold red]{kind}:[/bold red] " + text.replace("[", r"\["))
+    err.print(f"[bold red]{kind}:[/bold red] {plain(text)}")
 
 
 def _for_a_bug_report(problem: Exception) -> str:
@@ -165,5 +174,8 @@ def _for_a_bug_report(problem: Exception) -> str:
         path.write_text("".join(traceback.format_exception(problem)), encoding="utf-8")
     except OSError:
         where = "its details could not be written here"
+        with suppress(OSError):
+            path.unlink()  # what of it a full disk took
     first_line = str(problem).splitlines()[0] if str(problem) else ""
-    return f"{type(problem).__name__}: {first_line} ({where}; finished stages are kept)"
+    kept = f"; {KEPT}" if _keeps_stages() else ""
+    return f"{type(problem).__name__}: {first_line} ({where}{kept})"

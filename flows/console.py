@@ -24,6 +24,7 @@ class StageLines:
         self._open: str = ""  # stage whose items are being counted
         self._counts: Counter[str] = Counter()
         self._last_detail = ""
+        self._broken: set[str] = set()  # stages that end the run, whatever other items come to
         self._lock = Lock()
 
     def __enter__(self) -> "StageLines":
@@ -42,13 +43,15 @@ class StageLines:
                 self._show(event)
                 return
             if event.outcome == "noted":
-                out.print(f"  [yellow]![/yellow] {_escape(event.detail)}")
+                out.print(f"  [yellow]![/yellow] {plain(event.detail)}")
                 return
             bar = self._bars.pop((event.stage, event.item), None)
             if bar is not None:
                 self._progress.remove_task(bar)
-            if event.outcome == "failed":
-                out.print(f"  [red]✗[/red] {_readable(event.stage)}: {_escape(event.detail)}")
+            if event.outcome == "broke":
+                self._broken.add(event.stage)
+            if event.outcome in ("failed", "broke"):
+                out.print(f"  [red]✗[/red] {_readable(event.stage)}: {plain(event.detail)}")
                 return
             if event.stage != self._open:
                 self._close()
@@ -81,7 +84,8 @@ class StageLines:
         if will:
             words.append(f"{will if will > 1 else ''} will run: {self._last_detail}".strip())
         mark = "→" if will else "[green]✓[/green]"
-        out.print(f"  {mark} {_readable(self._open)}{items}: {_escape(', '.join(words))}")
+        if self._open not in self._broken:
+            out.print(f"  {mark} {_readable(self._open)}{items}: {plain(', '.join(words))}")
         self._open, self._counts, self._last_detail = "", Counter(), ""
 
 
@@ -90,8 +94,11 @@ def _readable(stage: str) -> str:
 
 
 def _label(event: Event) -> str:
-    return _escape(f"{_readable(event.stage)} {event.item}".strip())
+    return plain(f"{_readable(event.stage)} {event.item}".strip())
 
 
-def _escape(text: str) -> str:
-    return text.replace("[", r"\[")
+def plain(text: str) -> str:
+    """A text as it stands: without the console's markup, and what a terminal would obey or cannot show (of a
+    file's name, mostly) as an escape."""
+    shown = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+    return "".join(shown).replace("[", r"\[")

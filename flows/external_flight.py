@@ -11,6 +11,7 @@ from flows.inspection_file import existing
 from schemas.inspection import Inspection, PhotoSet
 from schemas.problem import BadInput
 from tasks import run
+from tasks.flight.task import refuse_unless_log
 from tasks.stage import NotYetKnown
 
 LOG_SUFFIXES = {".tlog", ".bin", ".ulg", ".mcap"}
@@ -30,14 +31,19 @@ class ExternalFlight(RunInput):
 def photos_and_logs(inspection: Inspection, base: Path) -> tuple[tuple[PhotoSet, ...], list[Path]]:
     """The photos and the logs of external flights: from the inspection, else asked for."""
     if inspection.photos and inspection.flight_log:
-        named = inspection.flight_log
-        named = (named,) if isinstance(named, str) else named
-        return inspection.photos, [log for name in named for log in _logs(base, name, "flight_log")]
+        return inspection.photos, given_logs(inspection, base)
     if run.current().dry:
         raise NotYetKnown("fly")
     if not deployed():
         raise WaitingForFlight
     return _asked_for(base)
+
+
+def given_logs(inspection: Inspection, base: Path) -> list[Path]:
+    """Those that the inspection names. BadInput where one is missing or none that can be read."""
+    named = inspection.flight_log or ()
+    named = (named,) if isinstance(named, str) else named
+    return [log for name in named for log in _logs(base, name, "flight_log")]
 
 
 def deployed() -> bool:
@@ -49,11 +55,13 @@ def deployed() -> bool:
 def _logs(base: Path, name: str, key: str) -> list[Path]:
     """The log of that name, or those in the folder of that name."""
     path = existing(base, name, key)
-    if not path.is_dir():
-        return [path]
-    logs = sorted(p for p in path.iterdir() if p.suffix.lower() in LOG_SUFFIXES)
+    logs = [path]
+    if path.is_dir():
+        logs = sorted(p for p in path.iterdir() if p.suffix.lower() in LOG_SUFFIXES)
     if not logs:
         raise BadInput(name, "holds no log", f"Put {', '.join(sorted(LOG_SUFFIXES))} files there")
+    for log in logs:
+        refuse_unless_log(log, log.name)
     return logs
 
 

@@ -7,10 +7,11 @@ from cyclopts import Parameter
 
 from artifacts.run_folder import lay_out
 from flows.command_line import app
-from flows.console import err
+from flows.console import err, plain
 from flows.plain_files import (
     OutFolder,
     read_contract,
+    refuse_unless_file,
     say,
     working,
 )
@@ -68,7 +69,7 @@ def fly(
     if log.missed:
         said = f"; the vehicle said: {'; '.join(log.said)}" if log.said else ""
         text = f"Warning: {len(log.missed)} planned photos were not shot, first {log.missed[0]}{said}"
-        err.print("[yellow]" + text.replace("[", r"\[") + "[/yellow]")
+        err.print(f"[yellow]{plain(text)}[/yellow]")
 
 
 @app.command(name="convert-log")
@@ -84,10 +85,7 @@ def convert_log(log: Path, *, out: Annotated[Path, Parameter(name="--out")]) -> 
     """
     from tasks.flight.task import convert
 
-    if log.is_dir():
-        raise BadInput(str(log), "is a folder", "Convert one log at a time")
-    if not log.is_file():
-        raise BadInput(str(log), "no such file", "Correct the path")
+    refuse_unless_file(log, "Convert one log at a time")
     if out.is_dir():
         raise BadInput(str(out), "is a folder", "Give --out the name of the MCAP file to write")
     if out.exists() and out.samefile(log):
@@ -98,5 +96,5 @@ def convert_log(log: Path, *, out: Annotated[Path, Parameter(name="--out")]) -> 
     minutes = (max(times_s) - min(times_s)) / 60 if times_s else 0.0
     say(f"{minutes:.1f} min, {len(times_s):,} positions, {len(recording.triggers):,} photos: {out}")
     if not times_s:
-        text = f"Warning: {log.name} holds no position: is it whole?".replace("[", r"\[")
-        err.print(f"[yellow]{text}[/yellow]")
+        text = f"Warning: {log.name} holds no position: is it whole?"
+        err.print(f"[yellow]{plain(text)}[/yellow]")

@@ -3,11 +3,13 @@
 import inspect
 import json
 import re
+import unicodedata
 from pathlib import Path
 
 from pydantic import BaseModel
 
-from flows.given_photos import PHOTO_SUFFIXES
+from artifacts.whole_file import whole
+from flows.photo_files import PHOTO_SUFFIXES, is_hidden
 from schemas import settings
 from schemas.inspection import Inspection
 from schemas.problem import BadInput
@@ -35,7 +37,7 @@ def init_inspection(folder: Path, name: str | None) -> Path:
     path = folder / "inspection.yaml"
     if path.exists():
         raise BadInput(str(path), "is there already", "Edit it, or move it away first")
-    name = name or re.sub(r"[^A-Za-z0-9._-]+", "-", folder.resolve().name).strip("-._") or "inspection"
+    name = name or _name_after(folder.resolve())
     try:
         Inspection(name=name)
     except ValueError:
@@ -47,13 +49,19 @@ def init_inspection(folder: Path, name: str | None) -> Path:
     logs = _found(folder, LOG_SUFFIXES)
     if not scans and not photo_folders:
         raise BadInput(str(folder), "holds neither scans nor photos", "Copy the crew's files there first")
-    lines = [f"name: {name}  # also the folder under runs/"]
+    lines = [f"name: {_as_yaml(name)}  # also the folder under runs/"]
     lines += (
         _scan_lines(folder, scans) + _photo_lines(folder, photo_folders) + _flight_lines(folder, scans, logs)
     )
     for section, model in SECTIONS.items():
         lines += ["", f"# {section}:", *(f"#   {line}" for line in described(model))]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    try:
+        with whole(path) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as problem:
+        what = f"cannot be written to ({problem.strerror})"
+        remedy = "Free space there or make it writable, or copy what it holds to another folder"
+        raise BadInput(str(folder), what, remedy) from None
     return path
 
 
@@ -69,11 +77,30 @@ def described(model: type[BaseModel]) -> list[str]:
 
 
 def _found(folder: Path, suffixes: set[str]) -> list[Path]:
-    return sorted(p for p in folder.rglob("*") if p.suffix.lower() in suffixes and p.is_file())
+    """Below the folder; what programs have hidden there, a thumbnail say, is nobody's."""
+    there = (p for p in folder.rglob("*") if p.suffix.lower() in suffixes and p.is_file())
+    return sorted(p for p in there if not any(map(is_hidden, p.relative_to(folder).parts)))
+
+
+def _name_after(folder: Path) -> str:
+    """The folder's name, in its own alphabet; what a run's folder cannot be called by becomes a dash."""
+    called = unicodedata.normalize("NFC", folder.name)  # some systems take letters and their accents apart
+    kept = (c if c.isalnum() or c in "._-" or unicodedata.category(c)[0] == "M" else "-" for c in called)
+    return re.sub(r"-+", "-", "".join(kept)).strip("-._") or "inspection"
+
+
+def _as_yaml(text: str) -> str:
+    """In quotes: 007, no and 2024-05-01 are names too. BadInput where it is a name that is not UTF-8."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise BadInput(text, "its name is not in UTF-8", "Rename it, then try again") from None
+    quoted = json.dumps(text, ensure_ascii=False)
+    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in quoted)
 
 
 def _quoted(folder: Path, path: Path) -> str:
-    return json.dumps(path.relative_to(folder).as_posix() or ".", ensure_ascii=False)
+    return _as_yaml(path.relative_to(folder).as_posix() or ".")
 
 
 def _scan_lines(folder: Path, scans: list[Path]) -> list[str]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from flows.collect_images import Collected, collect
 from flows.detect_cracks import Detected, detect_in_photos
+from flows.external_flight import given_logs
 from flows.inspection_flow import inspection_flow
 from flows.model_structure import Modelled, has_scans, model
 from flows.opening import OpenRun, opened
@@ -33,6 +34,7 @@ def inspect_bridge(
 
 def inspect(run: OpenRun) -> CrackReport | None:
     """The paper's two stages, data collection and crack detection, and the report."""
+    given_logs(run.inspection, run.base)  # one that cannot be read is told before hours of work
     modelled = model(run.inspection, run.base) if has_scans(run.inspection) else None
     if modelled is not None:
         run.save_model(modelled)
@@ -96,7 +98,14 @@ def with_flight(run: OpenRun, photos: str | None, logs: Sequence[str]) -> OpenRu
     """The run of an external flight that is now flown: its photos and logs, as paths from here."""
     update: dict[str, object] = {}
     if photos is not None:
-        update["photos"] = (PhotoSet(folder=str(Path(photos).resolve())),)
+        update["photos"] = (PhotoSet(folder=_from_here("--photos", photos)),)
     if logs:
-        update["flight_log"] = tuple(str(Path(log).resolve()) for log in logs)
+        update["flight_log"] = tuple(_from_here("--log", log) for log in logs)
     return OpenRun(run.inspection.model_copy(update=update), run.base, run.folder)
+
+
+def _from_here(option: str, path: str) -> str:
+    resolved = Path(path).resolve()
+    if not resolved.exists():
+        raise BadInput(f"{option} {path}", "no such file or folder", "Correct the path")
+    return str(resolved)

@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from flows.explain import explain
+from flows.yaml_file import read_yaml
 from schemas.inspection import CameraInput, Inspection
 from schemas.problem import BadInput
 
@@ -20,15 +20,18 @@ def read_inspection(path: Path) -> Inspection:
         inspection = Inspection.model_validate(content)
     except ValidationError as problem:
         raise explain(str(path), problem, Inspection) from None
-    _refuse_photos_given_twice(path, inspection)
+    _check_photo_folders(path, inspection)
     return inspection
 
 
-def _refuse_photos_given_twice(path: Path, inspection: Inspection) -> None:
-    """A folder that is given twice for one surface would count its cracks twice."""
+def _check_photo_folders(path: Path, inspection: Inspection) -> None:
+    """A folder that is given twice for one surface would count its cracks twice; a file is none."""
     seen: set[tuple[Path, str]] = set()
     for photos in inspection.photos:
         folder = (path.parent / photos.folder).resolve()
+        if folder.is_file():
+            what = f"gives the file {photos.folder!r} as a folder of photos"
+            raise BadInput(str(path), what, "Name the folder that it is in")
         given = folder, photos.surface or folder.name
         if given in seen:
             raise BadInput(str(path), f"gives the photos {photos.folder!r} twice", "Give each folder once")
@@ -37,20 +40,7 @@ def _refuse_photos_given_twice(path: Path, inspection: Inspection) -> None:
 
 def settings_in(path: Path) -> dict[str, Any]:
     """What stands in a YAML file; BadInput where that is no settings."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadInput(str(path), "no such file", "Write one with: hairline init FOLDER") from None
-    except IsADirectoryError:
-        raise BadInput(str(path), "is a folder", "Name the inspection's YAML file in it") from None
-    except (OSError, UnicodeDecodeError) as problem:
-        raise BadInput(str(path), f"cannot be read ({problem})", "Give a YAML text file") from None
-    except yaml.YAMLError as problem:
-        where = getattr(problem, "problem_mark", None)
-        line = f" at line {where.line + 1}" if where else ""
-        raise BadInput(
-            str(path), f"is not valid YAML{line}", "Correct the indentation or quotes there"
-        ) from None
+    content = read_yaml(path, "inspection's YAML file", "Write one with: hairline init FOLDER")
     if not isinstance(content, dict):
         raise BadInput(str(path), "holds no settings", "Write one with: hairline init FOLDER")
     return content
@@ -59,16 +49,7 @@ def settings_in(path: Path) -> dict[str, Any]:
 def read_camera_file(path: Path) -> CameraInput:
     """CAMERA.yaml: width_px, height_px, and focal_px or focal_mm with sensor_width_mm; lens, k1…, shutter_s.
     An inspection file that has a camera does too."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError:
-        raise BadInput(
-            str(path), "cannot be read", "Give a YAML file with width_px, height_px, focal_px"
-        ) from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise BadInput(
-            str(path), "is not valid YAML", "Write width_px, height_px and focal_px in it"
-        ) from None
+    content = read_yaml(path, "camera's YAML file", "Give a YAML file with width_px, height_px, focal_px")
     if isinstance(content, dict) and "camera" in content:
         content = content["camera"]
         if isinstance(content, str):

@@ -1,18 +1,22 @@
 """Opening a run: its inspection, its folder, its store, and where its results are laid out for people."""
 
-import json
 import os
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pydantic import TypeAdapter
+
+from artifacts import store
 from artifacts.run_folder import remove_stale
+from artifacts.whole_file import whole
 from flows import results
 from flows.inspection_file import read_inspection
-from flows.output_folder import make_output_folder
+from flows.output_folder import make_output_folder, told_when_full
+from flows.run_claim import claimed, refuse_another_s
 from schemas.crack_report import CrackReport
 from schemas.file import Folder
 from schemas.flight_plan import FlightPlan
@@ -21,6 +25,8 @@ from schemas.problem import BadInput
 from tasks import run
 from tasks.simulation.task import demo_inspection
 from tasks.stage import STAGES
+
+TOKENS = TypeAdapter(dict[str, str])  # stage → token, as .redo.json holds them
 
 if TYPE_CHECKING:
     from flows.collect_images import Collected
@@ -66,22 +72,20 @@ def opened(inspection: str, out: str | None = None, redo: tuple[str, ...] = ()) 
     Listener and dryness are those of the run that is current, so that the command line can set them."""
     if inspection.startswith("demo:"):
         settings, base = demo_inspection(inspection.removeprefix("demo:")), Path.cwd()
-        folder = Path(out or f"runs/{settings.name}")
     else:
         path = Path(inspection)
         settings, base = read_inspection(path), path.resolve().parent
-        folder = Path(out or f"runs/{settings.name}")
-    folder = folder.resolve()
+    folder = Path(out or f"runs/{settings.name}").resolve()
     make_output_folder(folder)
+    refuse_another_s(folder, inspection)
     caller = run.current()
-    tokens = _redo_tokens(folder, redo, keep=not caller.dry)
-    with (
-        _store_beside(folder),
-        run.running(replace(caller, folder=folder, redo=tokens, last={})),
-    ):
-        yield OpenRun(settings, base, folder)
-    if not caller.dry:
-        (folder / ".redo.json").unlink(missing_ok=True)
+    claim = claimed(folder, inspection) if caller.lay_out else nullcontext()
+    with _store_beside(folder), told_when_full(folder, store.current().root), claim:
+        tokens = _redo_tokens(folder, redo, keep=not caller.dry)
+        with run.running(replace(caller, folder=folder, redo=tokens, last={})):
+            yield OpenRun(settings, base, folder)
+        if not caller.dry:
+            (folder / ".redo.json").unlink(missing_ok=True)
 
 
 @contextmanager
@@ -112,10 +116,14 @@ def _redo_tokens(folder: Path, redo: tuple[str, ...], keep: bool) -> dict[str, s
             stages = ", ".join(sorted(STAGES))
             raise BadInput(f"--redo {stage}", "there is no such stage", f"The stages are {stages}")
     path = folder / ".redo.json"
-    tokens: dict[str, str] = json.loads(path.read_text()) if path.is_file() else {}
+    try:
+        tokens = TOKENS.validate_json(path.read_bytes())
+    except (OSError, ValueError):  # none, or damaged
+        tokens = {}
     tokens |= {
         stage.replace("-", "_"): uuid.uuid4().hex for stage in redo if stage.replace("-", "_") not in tokens
     }
     if tokens and keep:
-        path.write_text(json.dumps(tokens))
+        with whole(path) as temporary:
+            temporary.write_bytes(TOKENS.dump_json(tokens))
     return tokens

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from artifacts.mission_files import write_missions
 from artifacts.run_folder import lay_out, safe_name
+from artifacts.whole_file import whole
 from schemas.detection import Detection, Patterns
 from schemas.evaluation import Curves, Evaluation
 from schemas.file import Folder
@@ -28,9 +29,8 @@ def write_json(path: Path, content: BaseModel | Mapping[str, Any]) -> None:
     """Stable bytes: the same content gives the same file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     plain = content.model_dump(mode="json") if isinstance(content, BaseModel) else content
-    temporary = path.with_name(f".{path.name}.tmp")
-    temporary.write_text(json.dumps(plain, indent=1) + "\n", encoding="utf-8")
-    temporary.replace(path)
+    with whole(path) as temporary:
+        temporary.write_text(json.dumps(plain, indent=1) + "\n", encoding="utf-8")
 
 
 def write_registration(folder: Path, model: RegisteredModel, copy: bool = False) -> None:

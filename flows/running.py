@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from flows.command_line import EXIT_WAITING_FOR_FLIGHT
-from flows.console import StageLines, out
+from flows.console import StageLines, out, plain
 from flows.own_server import answers, own_server
 from schemas.crack_report import CrackReport
 
@@ -85,11 +85,11 @@ def run_inspection(
 
     name = read_inspection(Path(inspection)).name  # a mistake in it is told before anything starts
     where = folder or Path("runs") / name
-    out.print(f"Inspecting {name}")
+    out.print(f"Inspecting {plain(name)}")
     try:
         report = run_flow(inspection, _text(folder), redo, _text(photos), tuple(str(log) for log in logs))
     except WaitingForFlight:
-        out.print(f"The plan is ready: {where / 'plan'}. Fly it, then:")
+        out.print(f"The plan is ready: {plain(str(where / 'plan'))}. Fly it, then:")
         out.print(f"  hairline run {shlex.quote(inspection)} --photos DIR --log FILE [FILE …]", markup=False)
         return EXIT_WAITING_FOR_FLIGHT
     except WaitingForBattery as waiting:
@@ -107,8 +107,8 @@ def run_demo(scene: str, folder: Path | None) -> int:
 
     out.print(f"Inspecting the simulated {scene}")
     demo = f"demo:{scene}"
+    report = run_flow(demo, _text(folder))
     with opened(demo, _text(folder)) as run:
-        report = run_flow(demo, _text(folder))
         if report is not None and run.inspection.simulation is not None:
             truth = simulation_truth.bare(run.inspection.simulation)
             out.print("\nAgainst the simulator's truth, which the inspection never reads:")
@@ -140,11 +140,13 @@ def say_results(report: CrackReport | None, folder: Path) -> None:
     """Where the results are; the last line is a warning where something was not inspected."""
     if report is None:
         made = "plan" if (folder / "plan").is_dir() else "surfaces"
-        out.print(f"\nThe {made}: {folder / made}")
+        out.print(f"\nThe {made}: {plain(str(folder / made))}")
         return
     widths = [crack.width_max_mm for crack in report.cracks if crack.width_max_mm is not None]
     widest = f", the widest {max(widths):.1f} mm" if widths else ""
-    out.print(f"\n{len(report.cracks)} cracks{widest}. Report: {folder / 'report' / 'index.html'}")
+    out.print(
+        f"\n{len(report.cracks)} cracks{widest}. Report: {plain(str(folder / 'report' / 'index.html'))}"
+    )
     if report.not_inspected:
         first = report.not_inspected[0]
         more = (
@@ -152,8 +154,8 @@ def say_results(report: CrackReport | None, folder: Path) -> None:
             if (len(report.not_inspected) > 1)
             else ""
         )
-        text = f"Warning: not inspected: {first.item}: {first.what}{more}".replace("[", r"\[")
-        out.print(f"[yellow]{text}[/yellow]")
+        text = f"Warning: not inspected: {first.item}: {first.what}{more}"
+        out.print(f"[yellow]{plain(text)}[/yellow]")
 
 
 def _text(path: Path | None) -> str | None:

@@ -89,7 +89,7 @@ class SimulationInput(Contract):
 
 
 class Inspection(Contract):
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")  # also the folder's name under runs/
+    name: str = Field(pattern=r"^[^\W_][\w.-]*$")  # also the folder's name under runs/, in any alphabet
     simulation: SimulationInput | None = None  # a rehearsal: scans, vehicle and photos are simulated
     scans: tuple[ScanInput, ...] = ()
     targets: tuple[

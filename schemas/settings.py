@@ -104,9 +104,15 @@ class DetectSettings(Contract):
 class AssessSettings(Contract):
     """Severity by width. The limits are those of common bridge manuals; set your own authority's."""
 
-    fine_mm: float = 0.2  # below: hairline
-    medium_mm: float = 0.5  # below: fine
-    wide_mm: float = 1.0  # below: medium; from here: wide
+    fine_mm: float = Field(default=0.2, gt=0)  # below: hairline
+    medium_mm: float = Field(default=0.5, gt=0)  # below: fine
+    wide_mm: float = Field(default=1.0, gt=0)  # below: medium; from here: wide
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.fine_mm <= self.medium_mm <= self.wide_mm:
+            raise ValueError("fine_mm, medium_mm and wide_mm must not descend")
+        return self
 
 
 class ReportSettings(Contract):

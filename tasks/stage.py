@@ -12,7 +12,6 @@ A stage is a function from schemas to a schema. Decorated, it is
 
 import inspect
 import json
-import os
 import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,7 +19,6 @@ from contextlib import suppress
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
-from threading import get_ident
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 from uuid import UUID
 
@@ -42,12 +40,13 @@ from pydantic import ConfigDict, validate_call
 
 from artifacts import store
 from artifacts.page import Page
+from artifacts.whole_file import whole
 from schemas.file import File
 from schemas.problem import BadInput
 from tasks import run
 from tasks.content_key import content_key, digest_code, digest_inputs, digest_of_look
 from tasks.progress_artifact import ProgressArtifact
-from tasks.run import Event
+from tasks.run import Event, KeyParts
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -184,8 +183,8 @@ class Stage(Generic[P, R]):
             return "to be redone"
         if last is None:
             return "has not run yet"
-        changed = [f"{name} edited" for name in _differences(last["code"], code)]
-        changed += [f"{name} changed" for name in _differences(last["inputs"], digests)]
+        changed = [f"{name} edited" for name in _differences(last.code, code)]
+        changed += [f"{name} changed" for name in _differences(last.inputs, digests)]
         return ", ".join(changed) or "its stored result is lost or altered"
 
     # -- hooks ---------------------------------------------------------------------------------------
@@ -223,7 +222,7 @@ class Stage(Generic[P, R]):
         inputs = self.named_inputs((), _parameters(context)) if context else {}
         item = item_name(inputs)
         code, digests = self._key_parts(inputs)
-        run.current().last[f"{self.name}/{item}"] = {"code": code, "inputs": digests}
+        run.current().last[f"{self.name}/{item}"] = KeyParts(code=code, inputs=digests)
         for page in self._drawn_pages(inputs, state):
             publish(page)
         seconds = self._seconds.pop(task_run.id, None)
@@ -241,16 +240,18 @@ class Stage(Generic[P, R]):
             return [Page(**page) for page in json.loads(path.read_bytes())]
         pages = self.pages(inputs, state.result())
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.{get_ident()}")
-        temporary.write_text(json.dumps([asdict(page) for page in pages]))
-        temporary.replace(path)
+        with whole(path) as temporary:
+            temporary.write_text(json.dumps([asdict(page) for page in pages]))
         return pages
 
     def _on_failure(self, _task: Task[..., Any], task_run: TaskRun, state: State[Any]) -> None:
         context = TaskRunContext.get()
         problem = failure(state)
-        detail = str(problem) if isinstance(problem, BadInput) else _one_line(problem)
-        _tell(Event(self.name, "failed", item_name(_parameters(context) if context else {}), detail=detail))
+        item = item_name(_parameters(context) if context else {})
+        if isinstance(problem, BadInput):
+            _tell(Event(self.name, "failed", item, detail=str(problem)))
+        else:
+            _tell(Event(self.name, "broke", item, detail=_one_line(problem)))
 
 
 def stage(

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from artifacts import store
 from artifacts.page import Page
@@ -105,7 +106,9 @@ def near(mask: "Mask", radius_px: int) -> "Mask":
 def link(inputs: Mapping[str, Any], _folder: Folder) -> list[Page]:
     host = os.environ.get("HAIRLINE_REPORT_URL", "http://127.0.0.1:4201")
     name = inputs["inspection"].name
-    return [Page(key="report", description=f"Report of {name}", link=f"{host}/{name}/report/index.html")]
+    return [
+        Page(key="report", description=f"Report of {name}", link=f"{host}/{quote(name)}/report/index.html")
+    ]
 
 
 @stage(pages=link)

@@ -130,6 +130,13 @@ def import_log(log: File, name: str, plan: FlightPlan | None) -> FlightLog:
         return _flight_log(recording, store.current().put(converted), plan, name)
 
 
+def refuse_unless_log(path: Path, name: str) -> None:
+    """BadInput where a file is no flight log; its first bytes tell."""
+    from tasks.flight.read_log import kind_of_log
+
+    kind_of_log(path, name)
+
+
 def convert(log: Path, out: Path) -> "Recording":
     """Convert a flight log (tlog, BIN, ulg) to MCAP, whole; gives what it holds. BadInput where it is none or
     damaged."""

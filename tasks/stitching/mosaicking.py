@@ -178,7 +178,8 @@ def _contradicted(
     if abs(np.log(gauge.scale)) < max(np.log(WRONG), DOUBTED * sigma):
         return ()
     told, stated = 1000.0 * usual_gsd_m, 1000.0 * gauge.scale * usual_gsd_m
-    what = f"its scale is {stated:.3g} mm/px by {gauge.scale_from}, {told:.3g} (± {100 * sigma:.2g} %) by {known_from}"
+    by_positions = f"{told:.3g} (± {100 * sigma:.2g} %) by {known_from}"
+    what = f"its scale is {stated:.3g} mm/px by {gauge.scale_from}, {by_positions}"
     remedy = "One of them is wrong: every length and width hangs on it"
     return (LeftOut(item=name, stage="stitch", what=what, remedy=remedy),)
 

@@ -44,6 +44,14 @@ def test_a_minimal_file_gets_every_default(tmp_path: Path) -> None:
             "gives the photos './q/../p' twice",
         ),
         ("name: a\nstitch: {ransac_px: .nan}\n", "key 'stitch.ransac_px'"),
+        ("name: a\nassess: {fine_mm: 5, medium_mm: 0.5, wide_mm: 0.1}\n", "must not descend"),
+        ("name: a\nplan:\n  a1: 1\n  a1: 2\n", "gives the key 'a1' twice, the second time at line 4"),
+        ("name: 2024-05-01\n", "key 'name' cannot be 2024-05-01 (give text in quotes)"),
+        ("name: 2024-13-01\n", "is not valid YAML (month must be in 1..12)"),
+        ("name: a\ndetect: [ridge]\n", "key 'detect' cannot be ['ridge'] (give keys with values)"),
+        ("name: a\nflight_log: 3\n", "key 'flight_log' cannot be 3 (give text in quotes or give a list)"),
+        ("name: a\nplan: {1: 2}\n", "key 'plan.1' cannot be 1 (give text in quotes)"),
+        ("name: a\nphotos: [{folder: inspection.yaml}]\n", "as a folder of photos"),
     ],
 )
 def test_a_mistake_is_named(tmp_path: Path, text: str, words: str) -> None:
@@ -54,7 +62,7 @@ def test_a_file_that_is_absent_binary_or_a_folder_is_named(tmp_path: Path) -> No
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00\x80")
     for name, words in (
         ("none.yaml", "no such file"),
-        ("binary.yaml", "cannot be read"),
+        ("binary.yaml", "Save it as UTF-8"),
         ("", "is a folder"),
     ):
         with pytest.raises(BadInput, match=words):
@@ -98,3 +106,18 @@ def test_the_camera_may_be_a_file_beside(tmp_path: Path) -> None:
     (tmp_path / "camera.yaml").write_text("width_px: 400\nfocal_px: 250\n")
     with pytest.raises(BadInput, match="key 'height_px' is missing"):
         read_inspection(tmp_path / "inspection.yaml")
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-16-le"])
+def test_a_file_in_another_encoding_is_told_how_to_save_it(tmp_path: Path, encoding: str) -> None:
+    (tmp_path / "inspection.yaml").write_text("name: Brücke\n", encoding=encoding)
+    with pytest.raises(BadInput, match="Save it as UTF-8"):
+        read_inspection(tmp_path / "inspection.yaml")
+
+
+def test_a_key_that_overrides_a_merged_one_is_no_second(tmp_path: Path) -> None:
+    (tmp_path / "inspection.yaml").write_text(
+        "name: a\nphotos:\n  - &first {folder: p, stitch: false}\n  - {<<: *first, folder: q}\n"
+    )
+    given = read_inspection(tmp_path / "inspection.yaml").photos
+    assert [(photos.folder, photos.stitch) for photos in given] == [("p", False), ("q", False)]

@@ -71,6 +71,13 @@ def test_a_redo_runs_the_named_stage_again(run: Run) -> None:
     assert ran(run()) == set()
 
 
+def test_damaged_notes_of_the_run_before_are_none(run: Run, tmp_path: Path) -> None:
+    run()
+    for name in (".stages.json", ".redo.json"):
+        (tmp_path / "runs/small" / name).write_text("[]")
+    assert ran(run("measure")) == {"measure"}
+
+
 def test_a_stage_that_does_not_exist_is_told_with_those_that_do(run: Run) -> None:
     with pytest.raises(BadInput, match=r"detect.*measure"):
         run("dtect")
@@ -94,10 +101,12 @@ def test_a_bad_photo_among_good_ones_is_left_out_by_name(run: Run, tmp_path: Pat
 def test_a_log_that_nothing_uses_is_told(
     run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert running.run_inspection("site/inspection.yaml", None, (), None, (Path("picture.png"),)) == 0
+    for log in (tmp_path / "b.ulg", tmp_path / "site" / "a.ulg"):
+        log.write_bytes(b"ULog\x01\x12\x35")
+    assert running.run_inspection("site/inspection.yaml", None, (), None, (Path("b.ulg"),)) == 0
     assert "not inspected: flight_log: not used: nothing says whose flight" in capsys.readouterr().out
     path = tmp_path / "site/inspection.yaml"
-    path.write_text(path.read_text() + "flight: external\nflight_log: a.tlog\n")
+    path.write_text(path.read_text() + "flight: external\nflight_log: a.ulg\n")
     assert "flight: not used: no plan was made, since the key 'scans' is missing (and 1 more" in run()
 
 
