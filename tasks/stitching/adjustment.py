@@ -98,10 +98,13 @@ def adjust(
             bundle = replace(bundle, spread=spread)
             X, w = points(state, bundle, sigma)
             state = replace(state, X=X, w=w)
-            if (seen_well := met(state, bundle)).all():
-                break
+            seen_well = met(state, bundle)
+            if seen_well.all():
+                state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
+                seen_well = met(state, bundle)
+                if seen_well.all():
+                    break
             current = current.where(seen_well)
-        state, residual, sigma = _iterate(state, bundle, least_sigma, variance, converged)
         weight, trust = _robust(residual, sigma), _trust(state, bundle)
         variance = noise(bundle, residual, weight)
         on_progress((round_ + 1) / len(LEAST_SIGMA_PX))

@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from tasks.stitching.view import Array
 
-LEAST_PIVOT = 1e-14  # of an unknown's own diagonal: less is rounding
+LEAST_PIVOT, ROUNDING = 1e-14, 1e-9  # of an unknown's own diagonal: less is rounding, in either direction
 
 
 def solve_positive(A: Array, b: Array, shared: int = 0) -> Array:
@@ -42,7 +42,7 @@ def _factor_and_solve(A: Array, first: Array, x: Array) -> bool:
                 total -= A[i, k] * A[j, k]
             if j < i:
                 A[i, j] = total / A[j, j]
-            elif not A[i, i] > 0.0:
+            elif not (A[i, i] > 0.0 and total > -ROUNDING * A[i, i]):
                 return False
             else:
                 A[i, i] = np.sqrt(max(total, LEAST_PIVOT * A[i, i]))

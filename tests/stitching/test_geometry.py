@@ -17,7 +17,7 @@ from tasks.stitching.relief import HeightMap
 from tasks.stitching.seams import photo_map
 from tasks.stitching.skyline import solve_positive
 from tasks.stitching.tracks import Observations
-from tasks.stitching.view import FACING, View, rotation, rotation_vector, shrunk
+from tasks.stitching.view import FACING, Array, View, rotation, rotation_vector, shrunk
 
 CAMERA = Camera(width_px=800, height_px=600, focal_px=1000.0, k1=-0.08, k2=0.02, p1=1e-3, p2=-5e-4, k3=0.01)
 FISHEYE = Camera(
@@ -87,9 +87,18 @@ def test_skyline_solves_what_lapack_solves(n: int, shared: int, seed: int) -> No
     np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=1e-8, atol=1e-8)
 
 
-def test_skyline_refuses_what_is_not_positive() -> None:
+@pytest.mark.parametrize("A", [np.diag([1.0, -1.0]), np.array([[1.0, 2.0], [2.0, 1.0]])])
+def test_skyline_refuses_what_is_not_positive(A: Array) -> None:
     with pytest.raises(np.linalg.LinAlgError):
-        solve_positive(np.diag([1.0, -1.0]), np.ones(2))
+        solve_positive(A, np.ones(2))
+
+
+def test_skyline_lets_what_nothing_tells_but_for_rounding_move_far() -> None:
+    A = np.array([[1.0, 1.0, 0.0], [1.0, 1.0 - 1e-16, 0.0], [0.0, 0.0, 2.0]])
+    x = solve_positive(A, np.array([1.0, 1.001, 4.0]))
+    assert np.isfinite(x).all()
+    assert abs(x[1]) > 1e6
+    assert x[2] == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("relief", [None, RELIEF], ids=["flat", "relief"])
