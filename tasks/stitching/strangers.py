@@ -9,27 +9,32 @@ from schemas.geodesy import GeoOrigin
 from schemas.photo import Photo
 from tasks.stitching.view import Array
 
-FEWEST = 5  # photos with positions that can outvote one
-ALONE = 10.0  # times farther from the nearest than three quarters of the photos are
+FEWEST = 5  # places that can outvote one
+SAME = 3.0  # sigma of the positions: nearer ones are one place, at which a vehicle hovered
+ALONE = 10.0  # times farther from the nearest than three quarters of the places are
 SIGMAS = 10.0  # and so many of the positions' error
-MOST = 0.25  # share of the photos: more are no strangers, but another part of the structure
 
 
 def strangers(photos: Sequence[Photo]) -> dict[int, float]:
-    """Metres from the nearest other photo, of those that lie far from all: farther than the others are
+    """Metres from the nearest other place, of photos that lie far from all: farther than the others are
     spread, or many times farther than most of these from their nearest."""
     which, at = _positions(photos)
-    if len(which) < FEWEST:
+    if not which:
         return {}
-    nearest = cKDTree(at).query(at, k=2)[0][:, 1]
-    usual = float(np.percentile(nearest, 75))
-    suspect = np.flatnonzero(nearest > SIGMAS * max(photos[i].position_sigma_m for i in which))
-    found = {}
-    for k in suspect:
-        spread = float(np.linalg.norm(np.ptp(np.delete(at, k, axis=0), axis=0)))
-        if nearest[k] > min(ALONE * usual, spread):
-            found[which[k]] = float(nearest[k])
-    return found if len(found) <= MOST * len(which) else {}
+    sigma = max(photos[i].position_sigma_m for i in which)
+    _, place = np.unique(np.rint(at / (SAME * sigma)), axis=0, return_inverse=True)
+    count = np.bincount(place.ravel())
+    if len(count) < FEWEST:
+        return {}
+    places = np.stack([np.bincount(place.ravel(), column) / count for column in at.T], axis=1)
+    nearest = cKDTree(places).query(places, k=2)[0][:, 1]
+    usual = ALONE * float(np.percentile(nearest, 75))
+    far = {}
+    for k in np.flatnonzero(nearest > SIGMAS * sigma):
+        spread = float(np.linalg.norm(np.ptp(np.delete(places, k, axis=0), axis=0)))
+        if nearest[k] > min(usual, spread):
+            far[int(k)] = float(nearest[k])
+    return {i: far[int(k)] for i, k in zip(which, place.ravel(), strict=True) if int(k) in far}
 
 
 def _positions(photos: Sequence[Photo]) -> tuple[list[int], Array]:

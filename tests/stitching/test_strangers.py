@@ -37,6 +37,23 @@ def test_a_position_far_from_all_others_is_strange(x: float, away: float) -> Non
     assert found == {20: pytest.approx(away)}
 
 
+def test_far_is_more_than_the_others_are_spread_or_many_times_their_distances() -> None:
+    long = np.column_stack([5.0 * np.arange(200), np.zeros((200, 2))])
+    assert strangers(photos([*long, (1095.0, 0.0, 0.0)])) == {200: pytest.approx(100.0)}
+    sparse = 8.0 * ROW[:6]
+    assert strangers(photos([*sparse, (500.0, 0.0, 0.0)])) == {6: pytest.approx(300.0)}
+
+
+def test_a_burst_at_a_strange_place_is_strange_and_one_at_each_station_is_not() -> None:
+    """Then most photos lie at no distance from their nearest."""
+    stations = np.repeat(8.0 * ROW[:6], 3, axis=0) + np.random.default_rng(1).normal(0, 0.3, (18, 3))
+    assert strangers(photos([*stations, (240.0, 5.0, 0.0)])) == {}
+    lost = np.repeat([[9000.0, 0.0, 0.0]], 3, axis=0)
+    assert strangers(photos([*stations, *lost])) == dict.fromkeys(
+        (18, 19, 20), pytest.approx(8800.0, abs=1.0)
+    )
+
+
 def test_a_second_wall_a_last_shot_on_the_way_home_and_bursts_are_not() -> None:
     second = ROW + np.array([0.0, 800.0, 0.0])
     for at in (
