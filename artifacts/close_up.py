@@ -39,7 +39,7 @@ def widest_place(crack: Crack) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.
     if crack.widths and crack.width_max_mm is not None:
         s_mm = np.array([sample.s_mm for sample in crack.widths])
         nearest = np.argmin([abs(sample.width_mm - crack.width_max_mm) for sample in crack.widths])
-        share = float(s_mm[nearest] / s_mm[-1]) if s_mm[-1] > 0 else 0.5
+        share = float(s_mm[nearest] / (crack.length_mm or s_mm[-1])) if s_mm[-1] > 0 else 0.5
     at = share * lengths[-1]
     position = np.array([np.interp(at, lengths, line[:, 0]), np.interp(at, lengths, line[:, 1])])
     segment = int(np.clip(np.searchsorted(lengths, at), 1, max(1, len(line) - 1)))

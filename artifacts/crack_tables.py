@@ -30,7 +30,7 @@ def _row(crack: Crack | None) -> dict[str, str]:
     """Column names and fields; of None, the names with empty fields."""
     if crack is None:
         crack = _NAMES_ONLY
-    middle = crack.polyline_px[len(crack.polyline_px) // 2] if crack.polyline_px else (None, None)
+    middle = crack.middle_px or (None, None)
     x_m, y_m, z_m = crack.position_m or (None, None, None)
     u_m, v_m = crack.position_uv_m or (None, None)
     return {

@@ -106,6 +106,13 @@ class TiledTiff:
             rows, columns = (-(-size // TILE_PX) for size in self._levels[level])
             missing = min(2, rows - row // 2 * 2) * min(2, columns - column // 2 * 2)
             tile = np.zeros_like(full)
+        if self._channels:  # an odd last row or column is averaged with itself, not with what lies beyond
+            high, wide = (
+                min(TILE_PX, size - TILE_PX * at)
+                for size, at in zip(self._levels[level], (row, column), strict=True)
+            )
+            beyond = 0, TILE_PX - high, 0, TILE_PX - wide
+            full = cv2.copyMakeBorder(full[:high, :wide], *beyond, cv2.BORDER_REPLICATE)
         half = TILE_PX // 2
         top, left = row % 2 * half, column % 2 * half
         tile[top : top + half, left : left + half] = (

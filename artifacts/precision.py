@@ -12,12 +12,12 @@ def millimetres(value_mm: float | None, sigma_mm: float | None = None, at_most: 
     if value_mm is None:
         return "–"
     if sigma_mm is None or sigma_mm <= 0:
-        return f"≤ {value_mm:.1f}" if at_most else f"{value_mm:.1f}"
+        return f"≤ {_up(value_mm, -1):.1f}" if at_most else f"{value_mm:.1f}"
     place = _last_place(sigma_mm)
     decimals = max(0, -place)
-    value = f"{_rounded(value_mm, place):.{decimals}f}"
     if at_most:
-        return f"≤ {value}"
+        return f"≤ {_up(value_mm, place):.{decimals}f}"
+    value = f"{_rounded(value_mm, place):.{decimals}f}"
     return f"{value} ± {_rounded(max(sigma_mm, 10.0**place), place):.{decimals}f}"
 
 
@@ -32,6 +32,11 @@ def _last_place(sigma_mm: float) -> int:
 
 def _rounded(value: float, place: int) -> float:
     return round(value, -place)
+
+
+def _up(value: float, place: int) -> float:
+    """An upper bound stays one."""
+    return math.ceil(round(value / 10.0**place, 6)) * 10.0**place
 
 
 def number(value: float | None, decimals: int = 1) -> str:

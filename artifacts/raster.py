@@ -128,7 +128,8 @@ def read_drawn_mask(path: Path, name: str) -> npt.NDArray[np.bool_]:
             drawn = (alpha // 257 if alpha.dtype == np.uint16 else alpha).astype(np.uint8)
     if drawn is None:
         raise BadInput(name, "is no image", "Give the mask as PNG, not 0 where there is a crack")
-    blurred = np.count_nonzero(np.bincount(drawn.ravel(), minlength=256)) > MOST_LEVELS
+    levels = cv2.calcHist([drawn], [0], None, [256], [0, 256])
+    blurred = np.count_nonzero(levels) > MOST_LEVELS
     mask: npt.NDArray[np.bool_] = drawn >= (drawn.max() / 2 if blurred else 1)
     if mask.mean() > 0.5:
         share = f"marks {100 * mask.mean():.0f} % of the image as crack"

@@ -179,10 +179,9 @@ def _draw_labels(
 ) -> None:
     taken: list[Box] = []
     for crack in cracks:
-        line = np.asarray(crack.polyline_px, dtype=float).reshape(-1, 2)
-        if not len(line):
+        if crack.middle_px is None:
             continue
-        x_px, y_px = line[len(line) // 2]
+        x_px, y_px = crack.middle_px
         strip = next((s for s in placed if _holds(s.window, x_px, y_px)), placed[0])
         x, y = strip.to_sheet((x_px, y_px))
         text = short_id(crack)

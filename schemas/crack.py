@@ -1,5 +1,7 @@
 """A crack, measured."""
 
+import math
+from itertools import pairwise
 from typing import Literal
 
 from schemas.contract import Contract, Vector2, Vector3
@@ -35,6 +37,20 @@ class Crack(Contract):
     network: int = 0  # cracks of one surface that are joined (branches) share it
     kind: Literal["longitudinal", "transverse", "diagonal", "map"] | None = None
     severity: Literal["hairline", "fine", "medium", "wide"] | None = None
+
+    @property
+    def middle_px(self) -> Vector2 | None:
+        """Half-way along the centreline; its vertices lie where it bends, not evenly. None without one."""
+        if not self.polyline_px:
+            return None
+        left_px = sum(map(math.dist, self.polyline_px, self.polyline_px[1:])) / 2
+        for (x0, y0), (x1, y1) in pairwise(self.polyline_px):
+            step_px = math.hypot(x1 - x0, y1 - y0)
+            if step_px >= left_px and step_px > 0:
+                share = left_px / step_px
+                return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+            left_px -= step_px
+        return self.polyline_px[-1]
 
 
 class Measurement(Contract):

@@ -110,7 +110,8 @@ def _wide(p: Levels) -> Levels:
 
 
 def _probable(logit: Logits) -> Logits:
-    return np.asarray(cv2.divide(1.0, 1.0 + cv2.exp(-logit)), np.float32)
+    # As one row: OpenCV takes a (4, 1) array for a number of four channels.
+    return np.asarray(cv2.divide(1.0, 1.0 + cv2.exp(-logit.reshape(1, -1))), np.float32).reshape(logit.shape)
 
 
 def levels(logit: Logits) -> Levels:

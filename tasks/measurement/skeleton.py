@@ -155,9 +155,11 @@ def _longest_paths(graph: csr_array, least_px: float) -> list[npt.NDArray[np.int
             continue
         found.append(members[path])
         left = np.setdiff1d(np.arange(len(members)), path)
-        _, part = connected_components(csr_array(inside[left][:, left]), directed=False)
+        rest = csr_array(inside[left][:, left])
+        _, part = connected_components(rest, directed=False)
+        steps_px = np.bincount(part, np.asarray(rest.sum(axis=1)).ravel()) / 2
         for some in _members(part):
-            if len(some) >= least_px / 1.5:  # a step is at most √2 px
+            if len(some) and steps_px[part[some[0]]] >= least_px:  # no path is longer than all steps
                 waiting.append(members[left[some]])
     return found
 

@@ -26,7 +26,10 @@ def test_examples(value_mm: float | None, sigma_mm: float | None, shown: str) ->
 
 
 def test_a_bound_is_shown_as_one() -> None:
-    assert millimetres(0.42, 0.2, at_most=True) == "≤ 0.4"
+    """Rounded up: 0.4 would be less than what was measured."""
+    assert millimetres(0.42, 0.2, at_most=True) == "≤ 0.5"
+    assert millimetres(0.4, 0.2, at_most=True) == "≤ 0.4"
+    assert millimetres(0.24, at_most=True) == "≤ 0.3"
 
 
 @given(st.floats(0.0, 1e5), st.floats(1e-3, 1e4))

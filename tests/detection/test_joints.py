@@ -1,3 +1,5 @@
+import time
+
 import cv2
 import numpy as np
 import pytest
@@ -5,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tasks.connected import Marked
-from tasks.detection.joints import Joint, straight_run
+from tasks.detection.joints import Joint, Run, _on_one_line, straight_run
 from tasks.detection.joints import without_joints as of_pixels
 
 
@@ -59,3 +61,25 @@ def test_a_single_pixel_holds_no_run() -> None:
 def test_an_empty_mask() -> None:
     cleaned, joints = without_joints(np.zeros((20, 30), dtype=bool), 400, 50)
     assert not cleaned.any() and not joints
+
+
+def test_the_joints_of_a_regular_wall_are_joints_at_any_size() -> None:
+    """Of 3000 px every 352nd pixel lies on the same few of its lines."""
+    wall = np.zeros((3000, 3000), np.uint8)
+    for at in range(50, 2995, 100):
+        wall[at : at + 4] = wall[:, at : at + 4] = 1
+    left, joints = without_joints(wall > 0, 800.0, 100.0)
+    assert not left.any()
+    assert len(joints) == 60
+
+
+def test_thousands_of_pieces_are_joined_in_a_moment() -> None:
+    rng = np.random.default_rng(3)
+    starts = rng.uniform(0, 30_000, (3000, 2))
+    ways = rng.normal(size=(3000, 2))
+    ends = starts + 60.0 * ways / np.linalg.norm(ways, axis=1)[:, None]
+    runs = [Run(np.ones(1, bool), a, b) for a, b in zip(starts, ends, strict=True)]
+    began = time.process_time()
+    groups = _on_one_line(runs)
+    assert sorted(i for group in groups for i in group) == list(range(3000))
+    assert time.process_time() - began < 20.0  # a loop over all pairs takes minutes

@@ -70,3 +70,10 @@ def test_bands_are_joined_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(sizes, "BAND_ROWS", rows)
         joined.append(join(of(full, 0), wider).joined)
     assert (joined[0] == joined[1]).all() and (joined[0] != full).mean() > 0.1
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (4, 1), (1, 4), (4, 4), (3, 2)])
+def test_probabilities_of_the_smallest_answers(shape: tuple[int, int]) -> None:
+    """OpenCV takes four rows of one number for one number of four channels."""
+    logit = np.linspace(-2.0, 2.0, shape[0] * shape[1], dtype=np.float32).reshape(shape)
+    np.testing.assert_allclose(sizes._probable(logit), 1.0 / (1.0 + np.exp(-logit)), rtol=1e-6)

@@ -10,7 +10,7 @@ from schemas.settings import DetectSettings
 from tasks.detection.detect import detect_image
 from tasks.measurement.measure import MeasuredImage, measure_cracks
 from tests.benchmarks.cracked_walls import cracked_wall
-from tests.measurement.drawn_crack import Drawn, drawn_crack
+from tests.measurement.drawn_crack import Drawn, drawn_crack, srgb
 
 
 def measured(drawn: Drawn) -> MeasuredImage:
@@ -134,6 +134,26 @@ def test_unevenly_lit_cracks_keep_their_width() -> None:
     bright = np.linspace(0.7, 0.15, 480)[None, :] * np.linspace(1.0, 0.8, 160)[:, None]
     crack = measured(drawn_crack(lambda x: 0 * x + 6.0, bright=bright)).cracks[0]
     assert abs(crack.widths.width_px.mean() - 6.0) < 0.12
+
+
+@pytest.mark.parametrize("angle_deg", [90, 45, 30])
+def test_a_branch_does_not_take_the_width_of_the_crack_that_it_leaves(angle_deg: int) -> None:
+    """3 px wide, out of one of 12: where they meet it has no width of its own."""
+    fine, half = 4, 160
+    crack = np.zeros((2 * half * fine, 2 * half * fine), np.uint8)
+    crack[:, (half - 6) * fine : (half + 6) * fine] = 1
+    along = np.array([np.sin(np.radians(angle_deg)), -np.cos(np.radians(angle_deg))])
+    end = np.rint(fine * (half + 90 * along)).astype(int)
+    cv2.line(crack, (half * fine, half * fine), (int(end[0]), int(end[1])), 1, 3 * fine)
+    blurred = cv2.GaussianBlur(crack.astype(np.float32), (0, 0), 0.746 * fine)
+    share = cv2.resize(blurred, (2 * half, 2 * half), interpolation=cv2.INTER_AREA)
+    noise = np.random.default_rng(1).normal(0, 1.5, share.shape)
+    grey = np.rint(255 * srgb(0.4 - 0.36 * share) + noise).clip(0, 255).astype(np.uint8)
+    found = measure_cracks(ArrayRaster(np.dstack([grey] * 3)), BitMask.of(share > 0.3), 30, 12)
+    branch = min(found.cracks, key=lambda crack: crack.length_px)
+    assert len(found.cracks) == 2
+    assert np.median(branch.widths.width_px) == pytest.approx(3.0, abs=0.3)
+    assert np.quantile(branch.widths.width_px, 0.95) == pytest.approx(3.0, abs=0.4)
 
 
 def test_gaps_are_bridged_and_order_is_by_position() -> None:

@@ -68,6 +68,13 @@ def test_gaps_are_bridged_only_straight_ahead() -> None:
     assert len({p.network for p in crack_paths(aside, 30, 15)}) == 2
 
 
+def test_a_branch_in_pieces_is_as_long_as_all_of_it() -> None:
+    """131 px from the main crack on, of which little more than half is seen."""
+    mask = np.zeros((400, 400), bool)
+    mask[10:390, 100] = mask[200, 101:115] = mask[200, 154:174] = mask[200, 213:233] = True
+    assert [round(length(p.points), -1) for p in crack_paths(mask, 100, 40)] == [380, 130]
+
+
 @settings(max_examples=50)
 @given(st.floats(0, 179.99), st.floats(5, 500))
 def test_orientation_of_a_line(direction: float, size: float) -> None:

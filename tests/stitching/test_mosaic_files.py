@@ -78,3 +78,11 @@ def test_a_window_off_the_tiles_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="does not start on a tile"):
         out.put(7, 0, np.zeros((10, 10), np.uint8))
     out.close()
+
+
+def test_smaller_levels_have_no_dark_rim(tmp_path: Path) -> None:
+    with MosaicWriter(tmp_path, 301, 301, None, (0.0, 0.0), "own plane") as writer:
+        ones = np.ones((301, 301), np.uint16)
+        writer.put(0, 0, np.full((301, 301, 3), 200, np.uint8), np.full((301, 301), 255, np.uint8), ones)
+    for level in range(2):
+        assert (tifffile.imread(writer.image, level=level) == 200).all()
