@@ -8,6 +8,7 @@ from cyclopts import Parameter
 from artifacts.run_folder import lay_out
 from flows.command_line import app
 from flows.console import err, plain
+from flows.option_types import Positive
 from flows.plain_files import (
     OutFolder,
     read_contract,
@@ -29,7 +30,7 @@ def fly(
     out: OutFolder,
     mission: str = "1",
     flight: int = 1,
-    timeout_s: float = 30.0,
+    timeout_s: Positive = 30.0,
 ) -> None:
     """Upload a plan to a vehicle over MAVLink, fly it, archive it: D/flight.mcap, D/track.json.
 

@@ -1,11 +1,12 @@
 """`hairline plan`: from surfaces to flights, or a table of what a camera could do, on plain files."""
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import yaml
 from cyclopts import Parameter
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 from rich.table import Table
 
 from flows.command_line import app
@@ -17,7 +18,7 @@ from flows.plain_files import Many, read_camera, read_contract, say, warn, worki
 from flows.structure_commands import enter_beside
 from schemas.problem import BadInput
 from schemas.settings import PlanSettings
-from schemas.utm import UtmZone
+from schemas.utm import UTM_ZONE
 from schemas.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -96,9 +97,9 @@ def plan(
     area_m2:
         With --what-if: area to photograph, square metres.
     """
-    from schemas.structure import Structure
+    from flows.given_structure import read_structure
 
-    structure = read_contract(surfaces, Structure) if surfaces is not None else None
+    structure = read_structure(surfaces) if surfaces is not None else None
     lens = read_camera(camera)
     vehicle, settings = _sections(
         camera,
@@ -182,6 +183,10 @@ def _where(
 
     if origin and anchors:
         raise BadInput("--anchor", "an origin is given too", "Give the one or the other")
+    if utm_zone and (origin or anchors):
+        raise BadInput("--utm-zone", "an origin or anchors are given too", "Give the one or the other")
+    if utm_zone and not re.fullmatch(UTM_ZONE, utm_zone):
+        raise BadInput("--utm-zone", f"{utm_zone!r} is no zone", "Write 32N, or 32S south of the equator")
     try:
         if anchors:
             found = structure.anchored(
@@ -198,10 +203,9 @@ def _where(
         if origin:
             stated = GeoOrigin(latitude_deg=origin[0], longitude_deg=origin[1], altitude_m=origin[2])
             return structure.origin_as_stated(stated)
-        return structure.geo_origin(utm_zone and TypeAdapter(UtmZone).validate_python(utm_zone))
+        return structure.geo_origin(utm_zone)
     except ValidationError as problem:
-        given = "--anchor" if anchors else "--origin" if origin else "--utm-zone"
-        raise explain(given, problem, GeoOrigin) from None
+        raise explain("--anchor" if anchors else "--origin", problem, GeoOrigin) from None
 
 
 def _what_if(

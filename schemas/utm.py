@@ -10,7 +10,8 @@ from schemas.contract import Vector3
 from schemas.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR_M, GeoOrigin
 from schemas.problem import BadInput
 
-UtmZone = Annotated[str, Field(pattern=r"^([1-9]|[1-5][0-9]|60)[NS]$")]  # such as 32N
+UTM_ZONE = r"^([1-9]|[1-5][0-9]|60)[NS]$"
+UtmZone = Annotated[str, Field(pattern=UTM_ZONE)]  # such as 32N
 
 CENTRAL_SCALE = 0.9996
 FALSE_EAST_M, FALSE_NORTH_M = 500_000.0, 10_000_000.0  # the latter in the south

@@ -126,6 +126,7 @@ class Link:
                 "is no MAVLink connection",
                 "Write udpin:127.0.0.1:14550, tcp:127.0.0.1:5760 or a serial port such as /dev/ttyUSB0,57600",
             )
+        self._check_port()
         while True:
             try:
                 return self._open()
@@ -136,6 +137,14 @@ class Link:
                 if not refused or time.monotonic() - self._started > self.timeout_s:
                     raise BadInput(self.url, f"cannot be opened ({error})", REMEDY) from None
                 time.sleep(min(RECONNECT_S, self.timeout_s))
+
+    def _check_port(self) -> None:
+        if not self.url.startswith(SCHEMES):
+            return
+        port = self.url.split(",")[0].rpartition(":")[2]
+        if self.url.count(":") < 2 or not (port.isascii() and port.isdigit() and int(port) < 65536):
+            what = "ends with no port, 0 to 65535"
+            raise BadInput(self.url, what, "Write udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760")
 
     def _open(self) -> Any:
         device, _, baud = self.url.partition(",")

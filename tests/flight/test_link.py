@@ -93,7 +93,9 @@ def test_says_heartbeats_as_a_ground_station() -> None:
     [
         ("tcp:127.0.0.1:1", "cannot be opened"),
         ("/dev/ttyNOWHERE,57600", "cannot be opened|needs pyserial"),
-        ("tcp:127.0.0.1", "cannot be opened"),
+        ("tcp:127.0.0.1", "ends with no port"),
+        ("udpin:0.0.0.0:99999", "ends with no port"),
+        ("udpout:127.0.0.1:abc", "ends with no port"),
         ("flight.tlog", "is no MAVLink connection"),
         ("udpin:127.0.0.1:0", "no vehicle answered within 0.4 s"),
     ],
