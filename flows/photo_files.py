@@ -85,11 +85,11 @@ def _folders(there: list[Path], others: Collection[Path], stated: str) -> list[L
             remedy="Name it too, or move its photos",
         )
         for path in there
-        if path.is_dir() and path.resolve() not in others and _holds_photos(path)
+        if path.is_dir() and path.resolve() not in others and holds_photos(path)
     ]
 
 
-def _holds_photos(folder: Path) -> bool:
+def holds_photos(folder: Path) -> bool:
     """As a card's DCIM/100MEDIA does; pictures of a run's report lie deeper, its mosaics are our own."""
     there = (path for pattern in ("*", "*/*") for path in folder.glob(pattern))
     return any(

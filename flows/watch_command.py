@@ -11,6 +11,7 @@ from rich.table import Table
 from flows.command_line import EXIT_WAITING_FOR_FLIGHT, app
 from flows.console import err, plain
 from flows.console import out as console
+from flows.photo_files import holds_photos
 from flows.plain_files import read_camera, read_contract, say
 from schemas.arrival import Arrival
 from schemas.problem import BadInput
@@ -51,6 +52,10 @@ def watch(folder: Path, *, plan: Path | None = None, camera: Path | None = None)
     lens = read_camera(camera) if camera else None
     session = Session(folder, flight, lens)
     console.print(f"Watching {folder} (Ctrl-C ends)", markup=False)
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and holds_photos(path):
+            text = f"{path} holds photos too, and is not watched: watch it instead, or in another window"
+            console.print(f"[yellow]{plain(text)}[/yellow]")
     try:
         for arrival in session.arrivals():
             _tell(arrival, session)

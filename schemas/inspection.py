@@ -1,5 +1,6 @@
 """The inspection file that a user writes (YAML). Paths are relative to the file's own folder."""
 
+import math
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -23,6 +24,8 @@ from schemas.settings import (
 from schemas.target import SiteTarget
 from schemas.utm import UtmZone
 from schemas.vehicle import Vehicle
+
+NARROWEST_DEG, WIDEST_DEG = 0.5, 170.0  # that a lens sees from left to right, at least and at most
 
 
 class CameraInput(Contract):
@@ -54,10 +57,20 @@ class CameraInput(Contract):
         if by_lens == (self.focal_px is not None):
             raise ValueError("give either focal_px, or focal_mm together with sensor_width_mm")
         check_lens(self.lens, self.p1, self.p2, self.k4)
+        view_deg = math.degrees(2 * math.atan(self.width_px / 2 / self._focal_px))
+        if not NARROWEST_DEG <= view_deg <= WIDEST_DEG:
+            raise ValueError(
+                f"it would see {view_deg:.2g}° from left to right: focal_px and width_px are pixels,"
+                " focal_mm and sensor_width_mm millimetres"
+            )
         return self
 
+    @property
+    def _focal_px(self) -> float:
+        return self.focal_px or (self.focal_mm or 0.0) / (self.sensor_width_mm or 1.0) * self.width_px
+
     def camera(self) -> Camera:
-        focal_px = self.focal_px or (self.focal_mm or 0.0) / (self.sensor_width_mm or 1.0) * self.width_px
+        focal_px = self._focal_px
         known = self.model_dump(exclude={"focal_px", "focal_mm", "sensor_width_mm"})
         if self.pixel_um is None and self.sensor_width_mm is not None:
             known["pixel_um"] = self.sensor_width_mm / self.width_px * 1000.0

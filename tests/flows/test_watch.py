@@ -141,6 +141,8 @@ def test_interrupted_it_says_what_lacks(tmp_path: Path, capsys: pytest.CaptureFi
     write_json(tmp_path / "plan.json", plan)
     card = tmp_path / "card"
     card.mkdir()
+    (card / "101MEDIA").mkdir()
+    picture(1).save(card / "101MEDIA" / "1.jpg")
     picture(0).save(card / f"{plan.shooting_points[0].photo}.jpg")
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     interrupt = threading.Timer(4 * STILL_S, signal.raise_signal, [signal.SIGINT])  # Ctrl-C
@@ -152,6 +154,7 @@ def test_interrupted_it_says_what_lacks(tmp_path: Path, capsys: pytest.CaptureFi
     said = capsys.readouterr()
     assert "2 shooting points have no good photo" in said.err
     assert plan.shooting_points[1].photo in said.out
+    assert "101MEDIA holds photos too" in " ".join(said.out.split())
     assert "soffit-1" in said.out
 
 

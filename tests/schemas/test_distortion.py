@@ -104,3 +104,11 @@ def test_coefficients_of_the_other_lens_are_refused() -> None:
 def test_an_ideal_lens_says_so() -> None:
     assert Camera(width_px=100, height_px=80, focal_px=90.0).is_ideal
     assert not Camera(width_px=100, height_px=80, focal_px=90.0, lens="fisheye").is_ideal
+
+
+@pytest.mark.parametrize(
+    "focal", [{"focal_px": 1e9}, {"focal_px": 3.0}, {"focal_mm": 8.8, "sensor_width_mm": 0.0132}]
+)
+def test_a_focal_length_in_other_units_is_told(focal: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="from left to right: focal_px and width_px are pixels"):
+        CameraInput.model_validate({"width_px": 4000, "height_px": 3000} | focal)
