@@ -12,7 +12,7 @@ from schemas.bit_mask import BitMask
 from schemas.raster import Progress, Raster
 from tasks.measurement.centreline import Points, arc_length, normals, orientation_deg, smooth, straight_ends
 from tasks.measurement.profiles import STEP_PX, Across, across
-from tasks.measurement.psf import estimate_psf_px
+from tasks.measurement.psf import Psf, estimated_psf
 from tasks.measurement.skeleton import Path, crack_paths
 from tasks.measurement.thickness import thickness_px
 from tasks.measurement.width_profile import Widths, measure_widths
@@ -95,11 +95,11 @@ def measure_cracks(
             lines.append(line)
         if on_progress is not None:
             on_progress((n + 1) / len(paths))
-    psf_px = estimate_psf_px(
+    psf = estimated_psf(
         [(p.offsets_px, p.darkness[p.usable]) for _, p, coarser, _, _ in lines if coarser == 1.0]
     )
-    cracks = [_measured(line, psf_px) for line in lines]
-    return MeasuredImage(sorted(cracks, key=lambda crack: crack.middle_px), rejected, psf_px)
+    cracks = [_measured(line, psf) for line in lines]
+    return MeasuredImage(sorted(cracks, key=lambda crack: crack.middle_px), rejected, psf.px)
 
 
 def _line(raster: Raster, path: Path, mask: BitMask) -> _Line:
@@ -139,10 +139,11 @@ def _peak(profiles: Across) -> npt.NDArray[np.float64]:
     return np.asarray(profiles.darkness[np.ix_(profiles.usable, middle)].mean(axis=1))
 
 
-def _measured(line: _Line, psf_px: float) -> MeasuredCrack:
+def _measured(line: _Line, psf: Psf) -> MeasuredCrack:
     profiles, coarser = line.profiles, line.coarser
-    blur = psf_px if coarser == 1.0 else max(psf_px / coarser, LEAST_PSF_PX)
-    known = measure_widths(profiles.offsets_px / coarser, profiles.darkness[profiles.usable], blur)
+    blur_px = psf.px if coarser == 1.0 else max(psf.px / coarser, LEAST_PSF_PX)
+    darkness = profiles.darkness[profiles.usable]
+    known = measure_widths(profiles.offsets_px / coarser, darkness, blur_px, psf.sigma_px / coarser)
     along = arc_length(line.centreline)
     width, sigma = (  # what lies on unknown pixels takes the width of its neighbours
         np.interp(along, along[profiles.usable], coarser * values)

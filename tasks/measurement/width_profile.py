@@ -52,8 +52,10 @@ def products(profiles: Profiles, shapes: Values) -> Values:
     return np.asarray(np.einsum("nt,wt->nw", profiles, shapes))
 
 
-def measure_widths(offsets_px: Values, darkness: Profiles, psf_px: float) -> Widths:
-    """Width of each of (N, T) profiles of one crack, N ≥ 1."""
+def measure_widths(
+    offsets_px: Values, darkness: Profiles, psf_px: float, psf_sigma_px: float = 0.0
+) -> Widths:
+    """Width of each of (N, T) profiles of one crack, N ≥ 1. psf_sigma_px: 1σ of the blur."""
     widths = _grid(float(offsets_px[-1]))
     match = _compare(offsets_px, darkness, widths, psf_px)
     free = np.clip(match.product / match.template, 0.02, DARKEST)
@@ -71,7 +73,9 @@ def measure_widths(offsets_px: Values, darkness: Profiles, psf_px: float) -> Wid
     noise = np.sqrt(apart[rows, best] / max(len(offsets_px) - 4, 1) * OVERSAMPLED)
     sigma = np.where(wide, 0.0, width * spread / shared)  # an error of D is one of w
     slope = np.maximum(shared * 2.0 / np.sqrt(2.0 * np.sqrt(np.pi) * psf_px / STEP_PX), 1e-6)
-    sigma = np.hypot(sigma, noise / slope) + 0.02
+    # A narrow profile is as wide as √(w² + 12 σ²), of a box and a blur: where σ errs, w does.
+    of_blur = 12.0 * psf_px * psf_sigma_px / np.maximum(width, 2.0 * psf_px)
+    sigma = np.hypot(np.hypot(sigma, noise / slope), np.where(wide, 0.0, of_blur)) + 0.02
     typical = float(np.median(width))
     if not anchored and typical < UNRESOLVED_SIGMAS * psf_px:
         bound = max(typical, _upper_bound(offsets_px, darkness, widths, psf_px))
