@@ -121,13 +121,14 @@ def read_drawn_mask(path: Path, name: str) -> npt.NDArray[np.bool_]:
     smoothing have made more levels of the few that were drawn, the edge lies half-way up. Where all of it is
     of one colour, what is drawn is the transparency. BadInput by name."""
     drawn = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if drawn is not None and stored is not None and stored.ndim == 3 and stored.shape[2] == 4:
-        alpha = stored[..., 3]
-        if (stored[..., :3] == stored[0, 0, :3]).all() and alpha.min() < alpha.max():
-            drawn = (alpha // 257 if alpha.dtype == np.uint16 else alpha).astype(np.uint8)
     if drawn is None:
         raise BadInput(name, "is no image", "Give the mask as PNG, not 0 where there is a crack")
+    if drawn.min() == drawn.max():
+        stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        if stored is not None and stored.ndim == 3 and stored.shape[2] == 4:
+            alpha = stored[..., 3]
+            transparent = (alpha // 257 if alpha.dtype == np.uint16 else alpha).astype(np.uint8)
+            drawn = transparent if alpha.min() < alpha.max() else drawn
     levels = cv2.calcHist([drawn], [0], None, [256], [0, 256])
     blurred = np.count_nonzero(levels) > MOST_LEVELS
     mask: npt.NDArray[np.bool_] = drawn >= (drawn.max() / 2 if blurred else 1)

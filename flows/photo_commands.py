@@ -1,6 +1,5 @@
 """`hairline stitch`, `detect` and `measure`: from photos to cracks, on plain files."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
@@ -147,13 +146,12 @@ def detect(
     )
     seen: list[Detected] = []
     problems: list[BadInput] = []
-    masks: set[str] = set()
+    masks, first = set[str](), dict[str, str]()
     paths = photos_in(images, mosaics=True)
     with working(out) as progress:
         for number, path in enumerate(paths, start=1):
             try:
-                before = [photo for one in seen for photo in one.mosaic.photos]
-                seen.append(detected(path, settings, gsd_mm_px, model, before))
+                seen.append(detected(path, settings, gsd_mm_px, model, first))
                 name = path.stem if [p.stem for p in paths].count(path.stem) == 1 else path.name
                 lay_out(out, {f"{name}.mask.png": seen[-1].detection.mask}, copy=True)
                 masks.add(safe_name(f"{name}.mask.png"))
@@ -211,9 +209,10 @@ def detected(
     settings: "DetectSettings",
     gsd_mm_px: float | None,
     model: Path | None = None,
-    before: "Sequence[Photo]" = (),
+    first: dict[str, str] | None = None,
 ) -> Detected:
-    """One image, seen through to its cracks. before: photos whose cracks are counted already."""
+    """One image, seen through to its cracks. first: photos whose cracks are counted already, as
+    `fit_alone` has them."""
     from artifacts import store
     from schemas.settings import PatternSettings
     from tasks.detection.task import detect as detect_cracks
@@ -227,7 +226,7 @@ def detected(
         mosaic = given_mosaic(file, path.name, gsd_mm_px)
     else:
         photo = ingest.bare(file, path.name, path.stem, None, None, 5.0)
-        *_, fit = fit_alone([*before, photo])
+        (fit,) = fit_alone([photo], first)
         if isinstance(fit, BadInput):
             raise fit
         mosaic = single.bare(photo, gsd_mm_px)

@@ -11,7 +11,7 @@ from rich.table import Table
 from flows.command_line import EXIT_WAITING_FOR_FLIGHT, app
 from flows.console import err, plain
 from flows.console import out as console
-from flows.photo_files import holds_photos
+from flows.photo_files import PHOTO_SUFFIXES, holds_photos, is_hidden
 from flows.plain_files import read_camera, read_contract, say
 from schemas.arrival import Arrival
 from schemas.problem import BadInput
@@ -138,13 +138,11 @@ class Session:
 
 def _photos(folder: Path) -> list[Path]:
     """By the time of writing, then by name: as the camera took them."""
-    from flows.photo_files import PHOTO_SUFFIXES
-
     try:
         found = [
             p
             for p in folder.iterdir()
-            if p.suffix.lower() in PHOTO_SUFFIXES and not p.name.startswith(".") and p.is_file()
+            if p.suffix.lower() in PHOTO_SUFFIXES and not is_hidden(p.name) and p.is_file()
         ]
         return sorted(found, key=lambda p: (p.stat().st_mtime_ns, p.name))
     except OSError:  # a card pulled out, a file renamed just now: the next look tells

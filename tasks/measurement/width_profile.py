@@ -52,9 +52,7 @@ def products(profiles: Profiles, shapes: Values) -> Values:
     return np.asarray(np.einsum("nt,wt->nw", profiles, shapes))
 
 
-def measure_widths(
-    offsets_px: Values, darkness: Profiles, psf_px: float, psf_sigma_px: float = 0.0
-) -> Widths:
+def measure_widths(offsets_px: Values, darkness: Profiles, psf_px: float, psf_sigma_px: float) -> Widths:
     """Width of each of (N, T) profiles of one crack, N ≥ 1. psf_sigma_px: 1σ of the blur."""
     widths = _grid(float(offsets_px[-1]))
     match = _compare(offsets_px, darkness, widths, psf_px)

@@ -8,10 +8,12 @@ from schemas.problem import BadInput
 BLANK = "Shoot it again; where it is a mosaic with blank parts, give it as TIFF with these transparent"
 
 
-def fit_alone(photos: Sequence[Photo]) -> tuple[Photo | BadInput, ...]:
+def fit_alone(photos: Sequence[Photo], first: dict[str, str] | None = None) -> tuple[Photo | BadInput, ...]:
     """Each photo, or why no crack can be looked for in it. Blur is judged among photos of one surface alone
-    (`sharpness_shares`)."""
-    first: dict[str, str] = {}
+    (`sharpness_shares`).
+
+    first: names of photos judged before, by the digest of their files; these are added."""
+    first = {} if first is None else first
     return tuple(_fit(photo, first.setdefault(photo.file.sha256, photo.name)) for photo in photos)
 
 

@@ -146,11 +146,12 @@ def calibrate(
     return made, draw_calibration(made)
 
 
-def fit_alone(photos: Sequence[Photo]) -> tuple[Photo | BadInput, ...]:
-    """Of photos that stand for themselves, each or why it is not inspected; no stage: it takes no time."""
+def fit_alone(photos: Sequence[Photo], first: dict[str, str] | None = None) -> tuple[Photo | BadInput, ...]:
+    """Of photos that stand for themselves, each or why it is not inspected; no stage: it takes no time.
+    first: as there."""
     from tasks.photos.alone import fit_alone as fit
 
-    return fit(photos)
+    return fit(photos, first)
 
 
 def judge(photos: Sequence[Photo], plan: FlightPlan | None) -> tuple[tuple[Arrival, ...], tuple[str, ...]]:

@@ -20,6 +20,7 @@ from artifacts.orthographic import Canvas, View
 from artifacts.surface_sheet import simplified, strips, ticks
 from artifacts.view3d import Scene, cloud_picture, has_underside, nice_length, picture
 from schemas.bit_mask import BitMask
+from schemas.crack import WidthSample
 from schemas.problem import BadInput
 from tests.artifacts.bridge import write_ply
 from tests.artifacts.inspected import Inspected
@@ -245,6 +246,15 @@ def test_the_close_up_holds_the_widest_place_at_its_true_scale(bridge: Inspected
         assert (window.width_px, window.height_px) == (75, 75)
         assert window.x0 <= place[0] < window.x1 and window.y0 <= place[1] < window.y1
         assert np.hypot(*direction) == pytest.approx(1.0)
+
+
+def test_the_widest_place_is_told_along_the_whole_crack(bridge: Inspected) -> None:
+    """The last width lies before the crack's end: 30 of 34 mm along is 30 px of 34, not the end."""
+    widths = tuple(WidthSample(s_mm=s, width_mm=w, sigma_mm=0.1) for s, w in ((0, 1), (10, 2), (30, 5)))
+    line = ((0.0, 0.0), (34.0, 0.0))
+    told = {"polyline_px": line, "widths": widths, "length_mm": 34.0, "width_max_mm": 5.0}
+    place, _ = widest_place(bridge.seen[0][3].cracks[0].model_copy(update=told))
+    assert place == pytest.approx([30.0, 0.0])
 
 
 def test_a_crack_lies_flat_where_its_surface_says(bridge: Inspected) -> None:

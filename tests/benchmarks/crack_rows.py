@@ -1,5 +1,5 @@
-"""Rows of cracks as such: how they turn, real ones beside the simulator's; and how wide jagged ones, as these
-are, are measured to be."""
+"""Rows of cracks as such: how they turn, real ones beside the simulator's; how wide jagged ones, as these
+are, are measured to be; and how blurred their photos are."""
 
 from collections.abc import Iterator
 
@@ -11,6 +11,7 @@ from schemas.bit_mask import BitMask
 from schemas.raster import ArrayRaster
 from tasks.measurement.centreline import resample, smooth
 from tasks.measurement.measure import measure_cracks
+from tasks.measurement.psf import DEFAULT_PX
 from tasks.measurement.skeleton import crack_paths
 from tests.benchmarks.cracked_walls import PX_M, cracked_wall
 from tests.benchmarks.table import Row, absent, row
@@ -76,6 +77,24 @@ def widths() -> Iterator[Row]:
         if errors:
             yield row(f"{what}: mean error", float(np.mean(errors)), "px", None, data, seeds)
             yield row(f"{what}: worst error", float(np.abs(errors).max()), "px", None, data, seeds)
+
+
+def blur() -> Iterator[Row]:
+    """σ of the blur of real photos whose cracks are wide enough to tell it."""
+    folder = ROOT / "cracks" / "uav"
+    if not folder.is_dir():
+        yield absent("blur", "", "cracks/uav is not on this machine")
+        return
+    told = []
+    for path in sorted((folder / "images").iterdir()):
+        rgb = np.asarray(cv2.imread(str(path), cv2.IMREAD_COLOR_RGB), np.uint8)
+        drawn = np.asarray(cv2.imread(str(folder / "masks" / path.name), 0)) > 0
+        psf_px = measure_cracks(ArrayRaster(rgb), BitMask.of(drawn), LEAST_PX, GAP_PX).psf_px
+        if psf_px != DEFAULT_PX:
+            told.append(psf_px)
+    for share in (5, 25, 50, 75, 95):
+        data = f"{len(told)} photos of uav"
+        yield row(f"blur: {share} % have less", float(np.percentile(told, share)), "px", None, data, None)
 
 
 def _middle(along: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -284,6 +284,7 @@ PARTS = {
     "walls": wall_rows.rows,
     "turns": crack_rows.turns,
     "widths": crack_rows.widths,
+    "blur": crack_rows.blur,
     "size": large_mosaic_rows.rows,
 }
 
